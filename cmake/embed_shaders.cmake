@@ -1,0 +1,16 @@
+# Writes OUTPUT.h and OUTPUT.cc with each SPIR-V file of FILES as a constant span of words.
+get_filename_component(base ${OUTPUT} NAME)
+set(header "#pragma once\n#include <cstdint>\n#include <span>\nnamespace opaline::shaders {\n")
+set(source "#include \"${base}.h\"\nnamespace opaline::shaders {\n")
+foreach(file ${FILES})
+  get_filename_component(name ${file} NAME)
+  string(REGEX REPLACE "\\.spv$" "" name ${name})
+  string(REGEX REPLACE "[^A-Za-z0-9]" "_" name ${name})
+  file(READ ${file} hex HEX)
+  string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1," words "${hex}")
+  string(APPEND header "extern const std::span<const std::uint32_t> ${name};\n")
+  string(APPEND source "static constexpr std::uint32_t k_${name}[] = {${words}};\n"
+    "const std::span<const std::uint32_t> ${name}{k_${name}};\n")
+endforeach()
+file(WRITE ${OUTPUT}.h "${header}}  // namespace opaline::shaders\n")
+file(WRITE ${OUTPUT}.cc "${source}}  // namespace opaline::shaders\n")

@@ -1,0 +1,92 @@
+# What every directory uses: opaline_library(), opaline_program(), opaline_test(), opaline_shaders().
+
+option(OPALINE_TESTS "Build the tests" ON)
+option(OPALINE_BENCH "Build the benchmarks" OFF)
+option(OPALINE_WERROR "A warning stops the build" OFF)
+set(OPALINE_SANITIZE "" CACHE STRING "Sanitizers, for instance address,undefined or thread")
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+find_package(Threads REQUIRED)
+find_program(OPALINE_CCACHE ccache)
+if(OPALINE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${OPALINE_CCACHE})
+endif()
+
+add_library(opaline_options INTERFACE)
+target_include_directories(opaline_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(opaline_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+  -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual -ffp-contract=off)
+if(OPALINE_WERROR)
+  target_compile_options(opaline_options INTERFACE -Werror)
+endif()
+if(OPALINE_SANITIZE)
+  target_compile_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE}
+    -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE})
+endif()
+
+# opaline_library(NAME SOURCES a.cc ... USES lower_library ... LINK third::party ...)
+# USES is the layer: what this library's files may include (tests/layering_test.cc reads them all).
+# LINK is private to the library; a third party that a header shows goes under PUBLIC_LINK.
+function(opaline_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;USES;LINK;PUBLIC_LINK" ${ARGN})
+  add_library(opaline_${name} STATIC ${A_SOURCES})
+  list(TRANSFORM A_USES PREPEND opaline_)
+  target_link_libraries(opaline_${name} PUBLIC opaline_options ${A_USES} ${A_PUBLIC_LINK} Threads::Threads
+    PRIVATE ${A_LINK})
+endfunction()
+
+# opaline_program(opaline-capture SOURCES capture_main.cc USES capture base_images LINK CLI11::CLI11)
+function(opaline_program name)
+  cmake_parse_arguments(A "" "" "SOURCES;USES;LINK" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  list(TRANSFORM A_USES PREPEND opaline_)
+  target_link_libraries(${name} PRIVATE opaline_options ${A_USES} ${A_LINK} Threads::Threads)
+endfunction()
+
+# opaline_test(capture/bracket_test USES capture sim LABELS unit [LINK ...] [ENVIRONMENT A=b ...])
+# builds tests/capture/bracket_test.cc with GoogleTest's main, one ctest entry for the file. Labels: unit needs
+# nothing, threads is also run under TSan, conformance a driver, gpu a Vulkan device (a software one will do),
+# api a daemon, slow is left out of sanitizer runs.
+function(opaline_test path)
+  cmake_parse_arguments(A "" "TIMEOUT" "USES;LABELS;LINK;ENVIRONMENT;SOURCES" ${ARGN})
+  string(REPLACE "/" "." name ${path})
+  add_executable(${name} ${CMAKE_SOURCE_DIR}/tests/${path}.cc ${A_SOURCES})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  list(TRANSFORM A_USES PREPEND opaline_)
+  target_link_libraries(${name} PRIVATE opaline_options ${A_USES} ${A_LINK} GTest::gmock GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name})
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 300)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${A_LABELS}" TIMEOUT ${A_TIMEOUT}
+    ENVIRONMENT "OPALINE_SOURCE_DIR=${CMAKE_SOURCE_DIR};OPALINE_BIN_DIR=${CMAKE_BINARY_DIR}/bin;${A_ENVIRONMENT}")
+endfunction()
+
+# opaline_shaders(LIBRARY a.comp b.frag ...) compiles each to SPIR-V in the build tree and embeds it as
+#   namespace opaline::shaders { extern const std::span<const std::uint32_t> a_comp; }   in "LIBRARY_shaders.h"
+function(opaline_shaders library)
+  find_program(GLSLANG glslangValidator REQUIRED)
+  set(dir ${CMAKE_CURRENT_BINARY_DIR}/shaders)
+  set(spvs)
+  foreach(shader ${ARGN})
+    get_filename_component(file ${shader} NAME)
+    set(spv ${dir}/${file}.spv)
+    add_custom_command(OUTPUT ${spv}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${dir}
+      COMMAND ${GLSLANG} --quiet -V --target-env vulkan1.2 -I${CMAKE_CURRENT_SOURCE_DIR}/shaders --depfile ${spv}.d
+        -o ${spv} ${CMAKE_CURRENT_SOURCE_DIR}/${shader}
+      DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${shader} DEPFILE ${spv}.d VERBATIM)
+    list(APPEND spvs ${spv})
+  endforeach()
+  add_custom_command(OUTPUT ${dir}/${library}_shaders.cc ${dir}/${library}_shaders.h
+    COMMAND ${CMAKE_COMMAND} "-DFILES=${spvs}" -DOUTPUT=${dir}/${library}_shaders
+      -P ${CMAKE_SOURCE_DIR}/cmake/embed_shaders.cmake
+    DEPENDS ${spvs} ${CMAKE_SOURCE_DIR}/cmake/embed_shaders.cmake VERBATIM)
+  target_sources(opaline_${library} PRIVATE ${dir}/${library}_shaders.cc ${dir}/${library}_shaders.h)
+  target_include_directories(opaline_${library} PRIVATE ${dir})
+endfunction()
