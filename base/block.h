@@ -16,8 +16,8 @@ inline constexpr std::array kFaces{
 
 /// "x_min" ... "z_max", as in files and configuration.
 constexpr std::string_view to_string(Face face) {
-  constexpr std::array<std::string_view, 6> names{"x_min", "x_max", "y_min",
-                                                  "y_max", "z_min", "z_max"};
+  constexpr std::array<std::string_view, 6> names{
+      "x_min", "x_max", "y_min", "y_max", "z_min", "z_max"};
   return names[static_cast<std::size_t>(face)];
 }
 
@@ -29,11 +29,11 @@ constexpr bool is_max(Face face) { return static_cast<int>(face) % 2 == 1; }
 /// The sample as a box of nx x ny x nz equal cells.
 ///
 /// The sample's frame has its origin at the corner of cell (0,0,0); cell (i,j,k) spans
-/// [i hx, (i+1) hx] x [j hy, (j+1) hy] x [k hz, (k+1) hz], in mm. Face z_max looks at the camera, z_min away from it.
-/// Cells are stored x fastest: index = (k ny + j) nx + i.
+/// [i hx, (i+1) hx] x [j hy, (j+1) hy] x [k hz, (k+1) hz], in mm. Face z_max looks at the camera,
+/// z_min away from it. Cells are stored x fastest: index = (k ny + j) nx + i.
 ///
-/// Cells of a face are a raster of width x height, column fastest: on x faces (column, row) = (j, k), on y faces
-/// (i, k), on z faces (i, j).
+/// Cells of a face are a raster of width x height, column fastest: on x faces (column, row) = (j,
+/// k), on y faces (i, k), on z faces (i, j).
 struct Block {
   int nx = 1;
   int ny = 1;
@@ -62,18 +62,24 @@ struct Block {
     const int last = cells()[axis_of(face)] - 1;
     const int depth = is_max(face) ? last : 0;
     switch (axis_of(face)) {
-      case 0: return index(depth, column, row);
-      case 1: return index(column, depth, row);
-      default: return index(column, row, depth);
+      case 0:
+        return index(depth, column, row);
+      case 1:
+        return index(column, depth, row);
+      default:
+        return index(column, row, depth);
     }
   }
   /// The centre of a face cell, in the sample's frame, mm.
   Vec3 face_cell_centre(Face face, int column, int row) const {
     const double last = is_max(face) ? 1.0 : 0.0;
     switch (axis_of(face)) {
-      case 0: return {last * nx * hx, (column + 0.5) * hy, (row + 0.5) * hz};
-      case 1: return {(column + 0.5) * hx, last * ny * hy, (row + 0.5) * hz};
-      default: return {(column + 0.5) * hx, (row + 0.5) * hy, last * nz * hz};
+      case 0:
+        return {last * nx * hx, (column + 0.5) * hy, (row + 0.5) * hz};
+      case 1:
+        return {(column + 0.5) * hx, last * ny * hy, (row + 0.5) * hz};
+      default:
+        return {(column + 0.5) * hx, (row + 0.5) * hy, last * nz * hz};
     }
   }
   bool operator==(const Block&) const = default;

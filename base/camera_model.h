@@ -6,14 +6,15 @@
 
 namespace opaline {
 
-/// A pinhole camera with Brown's radial and tangential distortion (Zhang 2000; OpenCV's order of coefficients).
+/// A pinhole camera with Brown's radial and tangential distortion (Zhang 2000; OpenCV's order of
+/// coefficients).
 ///
 ///   (x, y) = (X/Z, Y/Z),  r2 = x2 + y2,  c = 1 + k1 r2 + k2 r2^2 + k3 r2^3
 ///   x' = x c + 2 p1 x y + p2 (r2 + 2 x2),  y' = y c + p1 (r2 + 2 y2) + 2 p2 x y
 ///   pixel = (fx x' + cx, fy y' + cy)
 ///
-/// Units: pixels, top row first, pixel centres at .5; the camera looks along +Z, X right, Y down; mm elsewhere.
-/// A projector is the same thing backwards.
+/// Units: pixels, top row first, pixel centres at .5; the camera looks along +Z, X right, Y down;
+/// mm elsewhere. A projector is the same thing backwards.
 struct CameraModel {
   int width = 0;
   int height = 0;
@@ -30,7 +31,8 @@ struct CameraModel {
   };
   /// Where a point of the sample's frame (mm) is seen; the point must lie in front of the camera.
   Pixel project(Vec3 point_in_sample) const;
-  /// The direction, in the sample's frame, of the ray through a pixel; undoes the distortion by iteration.
+  /// The direction, in the sample's frame, of the ray through a pixel; undoes the distortion by
+  /// iteration.
   Vec3 ray_direction(Pixel pixel) const;
   /// The camera's centre in the sample's frame.
   Vec3 centre() const { return camera_from_sample.inverse().translation; }

@@ -15,21 +15,25 @@ namespace opaline {
 ///
 /// Shapes: rasters over the cells of a face as Block says, three channels (RGB).
 struct Illumination {
-  std::string name;               ///< "region_2_1", "held_out_half_shifted_0"
-  bool held_out = false;          ///< kept from the fit, for validation
-  Image<float> irradiance;        ///< E on the lit face before Fresnel, W/mm^2; fractional at the edges of a region
-  Image<float> radiance;          ///< L towards the camera on the seen face, W/(mm^2 sr)
-  Image<float> radiance_variance; ///< of the measurement, same shape; > 0 where the mask is set
-  Image<std::uint8_t> mask;       ///< 1 channel: 1 = usable, 0 = saturated, dark, outside, or lit directly
+  std::string name;         ///< "region_2_1", "held_out_half_shifted_0"
+  bool held_out = false;    ///< kept from the fit, for validation
+  Image<float> irradiance;  ///< E on the lit face before Fresnel, W/mm^2; fractional at the edges
+                            ///< of a region
+  Image<float> radiance;    ///< L towards the camera on the seen face, W/(mm^2 sr)
+  Image<float> radiance_variance;  ///< of the measurement, same shape; > 0 where the mask is set
+  Image<std::uint8_t>
+      mask;  ///< 1 channel: 1 = usable, 0 = saturated, dark, outside, or lit directly
 };
 
-/// What was measured, where on the sample, with which variance and mask: all that the reconstruction reads.
+/// What was measured, where on the sample, with which variance and mask: all that the
+/// reconstruction reads.
 struct Dataset {
-  Block block;                      ///< the sample's box and the cells its surface is resolved into
-  double ior = 1.3;                 ///< of the sample, as given
-  Face lit_face = Face::kZMin;      ///< light enters here, perpendicular
-  Face seen_face = Face::kZMax;     ///< what the camera looks at
-  Image<float> view_cosine;         ///< on the seen face, 1 channel: cosine of the angle of the camera to the normal
+  Block block;                   ///< the sample's box and the cells its surface is resolved into
+  double ior = 1.3;              ///< of the sample, as given
+  Face lit_face = Face::kZMin;   ///< light enters here, perpendicular
+  Face seen_face = Face::kZMax;  ///< what the camera looks at
+  Image<float> view_cosine;  ///< on the seen face, 1 channel: cosine of the angle of the camera to
+                             ///< the normal
   std::vector<Illumination> illuminations;
 };
 

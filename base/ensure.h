@@ -8,8 +8,8 @@ namespace opaline {
 }  // namespace opaline
 
 /// A broken invariant is a bug: logs and aborts in every build.
-#define ENSURE(condition)                                          \
-  do {                                                             \
-    if (!(condition)) [[unlikely]]                                 \
-      ::opaline::ensure_failed(#condition, __FILE__, __LINE__);    \
+#define ENSURE(condition)                                       \
+  do {                                                          \
+    if (!(condition)) [[unlikely]]                              \
+      ::opaline::ensure_failed(#condition, __FILE__, __LINE__); \
   } while (false)

@@ -11,10 +11,11 @@ namespace opaline {
 
 /// How far a long piece of work is; shown to people, worth nothing once it is over.
 struct Progress {
-  std::string step;                   ///< "capture", "homogeneous fit", ...
-  double fraction = 0.0;              ///< 0 to 1, of the step
-  std::optional<double> seconds_left; ///< of the step, when it can be told
-  nlohmann::json detail = nlohmann::json::object();  ///< region, exposure, objective, iteration, ...
+  std::string step;                    ///< "capture", "homogeneous fit", ...
+  double fraction = 0.0;               ///< 0 to 1, of the step
+  std::optional<double> seconds_left;  ///< of the step, when it can be told
+  nlohmann::json detail =
+      nlohmann::json::object();  ///< region, exposure, objective, iteration, ...
 };
 
 /// Where long work says what it does. Thread-safe in every implementation.

@@ -27,7 +27,8 @@ std::string frame_hash(const Image<std::uint16_t>& pixels) {
   std::vector<std::byte> bytes;
   bytes.reserve(12 + pixels.samples().size() * 2);
   for (const int value : {pixels.width(), pixels.height(), pixels.channels()}) {
-    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(value >> shift));
+    for (int shift = 0; shift < 32; shift += 8)
+      bytes.push_back(static_cast<std::byte>(value >> shift));
   }
   for (const std::uint16_t sample : pixels.samples()) {
     bytes.push_back(static_cast<std::byte>(sample & 255));

@@ -9,8 +9,8 @@
 
 namespace opaline {
 
-/// A picture in memory: height x width pixels of `channels` interleaved samples, row-major, top row first.
-/// The centre of pixel (x, y) lies at (x + 0.5, y + 0.5).
+/// A picture in memory: height x width pixels of `channels` interleaved samples, row-major, top row
+/// first. The centre of pixel (x, y) lies at (x + 0.5, y + 0.5).
 template <class T>
 class Image {
  public:

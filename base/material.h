@@ -19,7 +19,8 @@ struct ChannelCoefficients {
   bool operator==(const ChannelCoefficients&) const = default;
 };
 
-/// A volume of scattering coefficients with its geometry: what the reconstruction produces and the renderer draws.
+/// A volume of scattering coefficients with its geometry: what the reconstruction produces and the
+/// renderer draws.
 struct Material {
   Block block;
   double ior = 1.3;  ///< relative refractive index

@@ -1,0 +1,124 @@
+#include "base/files.h"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include <csignal>
+
+#include "base/lock.h"
+#include "base/session_directory.h"
+#include "tests/support/temporary_directory.h"
+
+namespace opaline {
+namespace {
+
+using ::testing::HasSubstr;
+
+class FilesTest : public ::testing::Test {
+ protected:
+  testing::TemporaryDirectory directory_;
+  std::filesystem::path path_ = directory_.path() / "file";
+};
+
+TEST_F(FilesTest, WritesWholeAndReplaces) {
+  ASSERT_TRUE(write_whole(system_files(), path_, "first"));
+  ASSERT_TRUE(write_whole(system_files(), path_, "2nd"));
+  EXPECT_EQ(read_text(path_).value(), "2nd");
+}
+
+// A file-size limit stands for the full disk: the write fails half way, with EFBIG instead of
+// ENOSPC.
+TEST_F(FilesTest, LeavesTheOldFileAndNoPartialOneWhenAWriteFailsHalfWay) {
+  ASSERT_TRUE(write_whole(system_files(), path_, "old"));
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{1000, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+
+  const auto written = write_whole(system_files(), path_, std::string(5000, 'x'));
+  const auto appended =
+      system_files().append(path_, std::as_bytes(std::span(std::string(5000, 'x'))));
+
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().message, HasSubstr("write 5000 bytes to"));
+  EXPECT_FALSE(appended);
+  EXPECT_EQ(read_text(path_).value(), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory_.path()), {}), 1);
+}
+
+TEST_F(FilesTest, RefusesAFileLongerThanTheLimit) {
+  ASSERT_TRUE(write_whole(system_files(), path_, "12345"));
+  EXPECT_TRUE(read_text(path_, 5));
+  const auto refused = read_text(path_, 4);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(FilesTest, SaysWhichFileIsMissing) {
+  const auto missing = read_text(path_);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(missing.error().message, HasSubstr(path_.string()));
+}
+
+TEST_F(FilesTest, LockExcludesASecondHolderAndIsSeenWithoutBeingTaken) {
+  EXPECT_FALSE(FileLock::is_held(path_).value());
+  {
+    const auto held = FileLock::acquire(path_);
+    ASSERT_TRUE(held);
+    EXPECT_TRUE(FileLock::is_held(path_).value());
+    const auto second = FileLock::acquire(path_);
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().code, ErrorCode::kBusy);
+  }
+  EXPECT_FALSE(FileLock::is_held(path_).value());
+  EXPECT_TRUE(FileLock::acquire(path_));
+}
+
+TEST_F(FilesTest, LockDiesWithItsProcess) {
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto lock = FileLock::acquire(path_);
+    if (::write(ready[1], "x", 1) != 1) ::_exit(1);
+    ::pause();
+    ::_exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
+  EXPECT_TRUE(FileLock::is_held(path_).value());
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_FALSE(FileLock::is_held(path_).value());
+}
+
+TEST_F(FilesTest, SessionDirectoryIsMadeOnceAndOpensAgain) {
+  const SessionDirectory::Contents contents{"wax", "a = 1\n", "b = 2\n", "c = 3\n"};
+  ASSERT_TRUE(SessionDirectory::create(system_files(), path_, contents));
+  const auto again = SessionDirectory::create(system_files(), path_, contents);
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::kBusy);
+
+  const auto session = SessionDirectory::open(path_);
+  ASSERT_TRUE(session);
+  EXPECT_EQ(session->name(), "wax");
+  EXPECT_EQ(read_text(session->rig_toml()).value(), "b = 2\n");
+}
+
+TEST_F(FilesTest, SessionDirectoryOfANewerVersionIsRefusedAndLeftAlone) {
+  ASSERT_TRUE(SessionDirectory::create(system_files(), path_, {"wax", "", "", ""}));
+  const std::string newer = R"({"format": 2, "name": "wax"})";
+  ASSERT_TRUE(write_whole(system_files(), path_ / "session.json", newer));
+  const auto session = SessionDirectory::open(path_);
+  ASSERT_FALSE(session);
+  EXPECT_THAT(session.error().message, HasSubstr("newer version (format 2"));
+  EXPECT_EQ(read_text(path_ / "session.json").value(), newer);
+}
+
+}  // namespace
+}  // namespace opaline
