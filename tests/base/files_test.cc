@@ -37,9 +37,9 @@ TEST_F(FilesTest, LeavesTheOldFileAndNoPartialOneWhenAWriteFailsHalfWay) {
   const rlimit small{1000, before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
 
-  const auto written = write_whole(system_files(), path_, std::string(5000, 'x'));
-  const auto appended =
-      system_files().append(path_, std::as_bytes(std::span(std::string(5000, 'x'))));
+  const std::string content(5000, 'x');
+  const auto written = write_whole(system_files(), path_, content);
+  const auto appended = system_files().append(path_, std::as_bytes(std::span(content)));
 
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
   std::signal(SIGXFSZ, handler);
