@@ -75,8 +75,8 @@ class [[nodiscard]] Result : public tl::expected<T, Error> {
 
  public:
   using Base::Base;
-  Result(Error error)
-      : Base(tl::unexpected<Error>(std::move(error))) {}  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor): `return timeout(...)` is the point of it
+  Result(Error error) : Base(tl::unexpected<Error>(std::move(error))) {}
 };
 
 /// Success, for calls that return nothing: `return ok();`
