@@ -22,7 +22,8 @@ struct CameraInfo {
 
 struct ExposureRequest {
   std::chrono::nanoseconds exposure{};
-  std::uint64_t expected_pattern = 0;  ///< what the projector was told; only replay needs it, to pick the photograph
+  std::uint64_t expected_pattern =
+      0;  ///< what the projector was told; only replay needs it, to pick the photograph
 };
 
 /// A camera that takes one exposure when asked.
@@ -31,17 +32,20 @@ struct ExposureRequest {
 ///        ^                 |                    |
 ///        +----close()------+         device lost: closed, kUnavailable
 ///
-/// Threads: one caller at a time; close() may come from any thread and ends a capture with kCancelled.
-/// Waits:   open() at most 5 s; capture() at most 1.5 times the exposure plus 2 s, then kTimeout;
+/// Threads: one caller at a time; close() may come from any thread and ends a capture with
+/// kCancelled. Waits:   open() at most 5 s; capture() at most 1.5 times the exposure plus 2 s, then
+/// kTimeout;
 ///          a stop request ends it with kCancelled within 100 ms.
-/// Errors:  kInvalidArgument for an exposure out of range; kUnavailable while closed or when the device is lost
+/// Errors:  kInvalidArgument for an exposure out of range; kUnavailable while closed or when the
+/// device is lost
 ///          (open() again once it is back); kNotFound where no such device exists.
 class Camera {
  public:
   virtual ~Camera() = default;
   virtual Result<void> open() = 0;
   virtual Result<CameraInfo> info() const = 0;
-  /// Takes one exposure. The frame's own fields say what it is: the caller checks them against what it asked for.
+  /// Takes one exposure. The frame's own fields say what it is: the caller checks them against what
+  /// it asked for.
   virtual Result<Frame> capture(const ExposureRequest& request, std::stop_token stop) = 0;
   virtual void close() noexcept = 0;
 };

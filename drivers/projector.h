@@ -15,11 +15,13 @@ struct ProjectorInfo {
   std::string serial;
   int width = 0;
   int height = 0;
-  std::chrono::nanoseconds frame_period{};  ///< of the colour wheel: exposures are whole multiples of it
-  std::chrono::nanoseconds latency{};       ///< from show() to light, at most
+  std::chrono::nanoseconds
+      frame_period{};                  ///< of the colour wheel: exposures are whole multiples of it
+  std::chrono::nanoseconds latency{};  ///< from show() to light, at most
 };
 
-/// What is to be shown. Codes are 8-bit, 3 channels, what the video input takes: gamma is the caller's to undo.
+/// What is to be shown. Codes are 8-bit, 3 channels, what the video input takes: gamma is the
+/// caller's to undo.
 struct Pattern {
   std::uint64_t id = 0;  ///< > 0, unique within a session
   Image<std::uint8_t> codes;
@@ -31,11 +33,11 @@ struct Pattern {
 ///        ^                ^ |                |
 ///        +----close()-----+-+----dark()------+         device lost: closed, kUnavailable
 ///
-/// open() and close() leave the lamp dark. show() returns once the pattern is *commanded*; light follows within the
-/// latency, so a caller settles before it exposes.
-/// Threads: one caller at a time; dark() may come from any thread.
-/// Waits:   every call at most 2 s, then kTimeout; a stop request ends it with kCancelled within 100 ms.
-/// Errors:  kInvalidArgument for a pattern of the wrong size or id 0; kUnavailable while closed or when lost.
+/// open() and close() leave the lamp dark. show() returns once the pattern is *commanded*; light
+/// follows within the latency, so a caller settles before it exposes. Threads: one caller at a
+/// time; dark() may come from any thread. Waits:   every call at most 2 s, then kTimeout; a stop
+/// request ends it with kCancelled within 100 ms. Errors:  kInvalidArgument for a pattern of the
+/// wrong size or id 0; kUnavailable while closed or when lost.
 class Projector {
  public:
   virtual ~Projector() = default;

@@ -13,8 +13,9 @@ namespace opaline::reconstruct::diffusion {
 
 /// The matrix of one channel: coefficients per cell and the boundary's constant.
 ///
-///   sum_faces a kappa_f / h (phi_i - phi_j) + (sum_boundary a g_b + V sigma_a) phi_i = b_i       (docs/physics.md)
-///   kappa_f = 2 kappa_i kappa_j / (kappa_i + kappa_j),   g_b = 1 / (2 A + h / (2 kappa_i))
+///   sum_faces a kappa_f / h (phi_i - phi_j) + (sum_boundary a g_b + V sigma_a) phi_i = b_i
+///   (docs/physics.md) kappa_f = 2 kappa_i kappa_j / (kappa_i + kappa_j),   g_b = 1 / (2 A + h / (2
+///   kappa_i))
 struct Medium {
   Block block;
   std::vector<double> diffusion;   ///< kappa per cell, mm, > 0
@@ -22,7 +23,8 @@ struct Medium {
   double boundary_a = 1.0;         ///< A of the boundary model (diffusion/boundary.h)
 };
 
-/// Several fields over the cells of a block, one after another: value = values[field * cells + cell].
+/// Several fields over the cells of a block, one after another: value = values[field * cells +
+/// cell].
 struct FieldBatch {
   std::size_t cells = 0;
   int count = 0;
@@ -49,12 +51,15 @@ struct SolveSummary {
   std::string message;             ///< one line for people
 };
 
-/// Solves K phi_m = b_m for many right-hand sides of one medium at once (K is symmetric, so adjoints too).
+/// Solves K phi_m = b_m for many right-hand sides of one medium at once (K is symmetric, so
+/// adjoints too).
 ///
 /// Shapes:  b and phi hold block.cell_count() cells each; b gives the number of right-hand sides.
 /// Threads: one call at a time per object; separate objects are independent.
-/// Errors:  kInvalidArgument when shapes differ, coefficients are out of range or not finite; kCancelled;
-///          kUnavailable when a device is lost. Not converging is an answer: SolveSummary::termination.
+/// Errors:  kInvalidArgument when shapes differ, coefficients are out of range or not finite;
+/// kCancelled;
+///          kUnavailable when a device is lost. Not converging is an answer:
+///          SolveSummary::termination.
 class FluenceSolver {
  public:
   virtual ~FluenceSolver() = default;

@@ -85,7 +85,7 @@ TEST_F(FilesTest, LockDiesWithItsProcess) {
   const pid_t child = ::fork();
   if (child == 0) {
     const auto lock = FileLock::acquire(path_);
-    if (::write(ready[1], "x", 1) != 1) ::_exit(1);
+    if (!lock || ::write(ready[1], "x", 1) != 1) ::_exit(1);
     ::pause();
     ::_exit(0);
   }
