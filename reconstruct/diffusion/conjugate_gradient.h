@@ -1,0 +1,68 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <stop_token>
+
+#include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/diffusion/passes.h"
+
+namespace opaline::reconstruct::diffusion {
+
+/// One symmetric V(1,1)-cycle from zero: z = B r on level 0, and rho = r . z.
+template <DiffusionPasses P>
+void v_cycle(P& passes) {
+  const int last = passes.levels() - 1;
+  for (int level = 0; level < last; ++level) passes.smooth_restrict(level);
+  for (int level = last; level >= 0; --level) passes.prolong_smooth(level);
+}
+
+/// The largest sqrt(norms / references) over the right-hand sides: infinite where a norm is not a
+/// number.
+double worst_ratio(std::span<const double> norms, std::span<const double> references);
+
+/// The summary with why the iteration stopped, in words.
+SolveSummary summarise(Termination termination, int iterations, double relative_residual);
+
+/// Conjugate gradients preconditioned by one V-cycle, for many right-hand sides at once, each with
+/// its own step lengths. (Hestenes & Stiefel 1952; Saad, Iterative Methods for Sparse Linear
+/// Systems, 2nd ed., Algorithm 9.1.)
+///
+/// The working precision may be single: whenever the recurred residual has fallen by 1e-4, and
+/// before convergence is believed, it is replaced by b - K x in float64 (van der Vorst & Ye 2000,
+/// SIAM J. Sci. Comput. 22, section 3), so the solution reaches float64 accuracy.
+///
+/// b_norms: ||b||^2 of each right-hand side. A right-hand side of zero must start from x = 0.
+/// Returns kBreakdown when three replacements in a row bring no progress or a number stops being
+/// one.
+template <DiffusionPasses P>
+SolveSummary conjugate_gradient(P& passes,
+                                std::span<const double> b_norms,
+                                const SolveOptions& options,
+                                const std::stop_token& stop) {
+  constexpr double kReplaceAfter = 1e-4;
+  double replaced = worst_ratio(passes.true_residual(), b_norms);
+  if (replaced <= options.tolerance) return summarise(Termination::kConverged, 0, replaced);
+  bool restart = true;
+  int stalls = 0;
+  for (int iteration = 1; iteration <= options.max_iterations; ++iteration) {
+    if (stop.stop_requested()) return summarise(Termination::kCancelled, iteration - 1, replaced);
+    v_cycle(passes);
+    passes.apply_dot(restart);
+    const double recurred = worst_ratio(passes.update_norm(), b_norms);
+    if (!std::isfinite(recurred)) return summarise(Termination::kBreakdown, iteration, recurred);
+    restart = false;
+    if (recurred > std::max(options.tolerance, kReplaceAfter * replaced)) continue;
+    const double actual = worst_ratio(passes.true_residual(), b_norms);
+    if (actual <= options.tolerance) return summarise(Termination::kConverged, iteration, actual);
+    stalls = actual > 0.5 * replaced ? stalls + 1 : 0;
+    if (stalls == 3) return summarise(Termination::kBreakdown, iteration, actual);
+    restart = actual > 2.0 * recurred;
+    replaced = actual;
+  }
+  const double actual = worst_ratio(passes.true_residual(), b_norms);
+  return summarise(Termination::kIterationLimit, options.max_iterations, actual);
+}
+
+}  // namespace opaline::reconstruct::diffusion

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <concepts>
+#include <span>
+
+namespace opaline::reconstruct::diffusion {
+
+/// The passes that a back end gives to conjugate_gradient.h. Fields stay on the back end, and so do
+/// the scalars of conjugate gradients, one of each a right-hand side; the caller reads norms, once
+/// an iteration.
+///
+/// Fields of level 0: b and x in float64; r, z, p, q and the correction d in the back end's working
+/// precision. Coarser levels have an r and a z. K, g, D, w are the level's, in
+/// diffusion/multigrid.h; red and black as there.
+///
+/// levels()              number of levels, >= 1.
+/// true_residual()       x += d, d = 0, r = b - K x in float64, then rounded to the working
+/// precision.
+///                       Returns ||r||^2 of every right-hand side, taken in float64.
+/// smooth_restrict(l)    for l < levels() - 1: one red-black Gauss-Seidel sweep on K z = r from z =
+/// 0, and the residual
+///                       it leaves handed to r of level l + 1:
+///                           red    z = r / D
+///                           black  z = (r + sum g z) / D
+///                           r_(l+1) = P^T (r - K z), which is zero in black cells and sum g z of
+///                           black neighbours,
+///                                     the change since the red half-sweep, in red ones
+///                       z need not be kept.
+/// prolong_smooth(l)     takes the correction from below and sweeps backwards, so that the V-cycle
+/// is symmetric:
+///                           red    z = r / D + P z_(l+1)       (on the last level: r / D)
+///                           black  z = (r + sum g z) / D
+///                           red    z = (r + sum g z) / D
+///                       (what smooth_restrict left in black cells is overwritten here before
+///                       anyone reads it). On level 0 also: rho_before = rho, rho = r . z.
+/// apply_dot(restart)    beta = rho / rho_before (0 when restart, or where rho_before is not > 0);
+///                       p = z + beta p, q = K p, gamma = p . q.
+/// update_norm()         alpha = rho / gamma (0 where gamma is not > 0); d += alpha p, r -= alpha
+/// q.
+///                       Returns ||r||^2 of every right-hand side: the only read of an iteration.
+///
+/// A back end may delay d += alpha p up to the next apply_dot or true_residual, and may scale each
+/// right-hand side by a constant of its own, as long as the norms it returns are of the unscaled
+/// fields. The spans live until the next pass.
+template <class P>
+concept DiffusionPasses = requires(P passes, int level, bool restart) {
+  { passes.levels() } -> std::convertible_to<int>;
+  { passes.true_residual() } -> std::convertible_to<std::span<const double>>;
+  passes.smooth_restrict(level);
+  passes.prolong_smooth(level);
+  passes.apply_dot(restart);
+  { passes.update_norm() } -> std::convertible_to<std::span<const double>>;
+};
+
+}  // namespace opaline::reconstruct::diffusion
