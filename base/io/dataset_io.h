@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+
+#include "base/dataset.h"
+#include "base/files.h"
+#include "base/result.h"
+
+namespace opaline {
+
+inline constexpr int kDatasetFormat = 1;
+
+/// A dataset on disk, in `directory`:
+///
+///   dataset.exr        the seen face: view_cosine; per illumination NAME.radiance.R G B,
+///                      NAME.variance.R G B and NAME.mask (0 or 1)
+///   dataset_light.exr  the lit face: per illumination NAME.irradiance.R G B
+///   dataset.json       format version, block, ior, faces, the illuminations in order, SHA-256 of
+///   both
+///
+/// dataset.json is written last and each file whole, so what can be read is complete. The same
+/// dataset gives the same bytes.
+/// Errors: kInvalidArgument for shapes that do not fit the block or names given twice;
+/// kUnavailable.
+Result<void> write_dataset(FileOperations& files,
+                           const std::filesystem::path& directory,
+                           const Dataset& dataset);
+
+/// Reads back exactly what was written.
+/// Errors: kNotFound when there is none; kInvalidArgument when a newer version wrote it, or when a
+/// file is damaged, naming it.
+Result<Dataset> read_dataset(const std::filesystem::path& directory);
+
+}  // namespace opaline

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "base/camera_model.h"
+#include "base/image.h"
+#include "base/result.h"
+
+namespace opaline::capture {
+
+/// How a camera's codes follow the light. With f the fraction of the code range above black,
+/// s the signal as a fraction of full scale (both 0 to 1):
+///
+///   kLinear  f = s          kGamma  f = s^(1/gamma)          kTable  s read from a table over f
+struct ResponseCurve {
+  enum class Kind : std::uint8_t { kLinear, kGamma, kTable };
+  Kind kind = Kind::kLinear;
+  double gamma = 1.0;         ///< of kGamma; > 0
+  std::vector<double> table;  ///< of kTable: s at equally spaced f, strictly increasing from 0 to 1
+};
+
+/// Falls off with the distance r from the middle of the picture, in units of half its diagonal:
+/// 1 + c0 r^2 + c1 r^4 + c2 r^6.
+struct Vignetting {
+  std::array<double, 3> coefficients{};
+  double at(double r_squared) const;
+};
+
+/// What the capture believes of its camera. A pixel sees
+///
+///   electrons = sensitivity . radiance . exposure . vignetting + leaks,   s = electrons /
+///   full_scale code      = black_level + (max_code - black_level) . f(s),            full_scale =
+///   gain (max_code - black_level)
+struct CameraCalibration {
+  CameraModel model;
+  int bit_depth = 12;
+  ResponseCurve response;
+  double black_level = 64.0;  ///< code without light
+  double gain_electrons_per_code = 2.5;
+  double read_noise_electrons = 3.0;                 ///< standard deviation
+  Vignetting vignetting;                             ///< about the picture's middle
+  std::array<double, 3> sensitivity{1e9, 1e9, 1e9};  ///< electrons per (W/(mm^2 sr) s), per channel
+  std::vector<std::pair<int, int>>
+      hot_pixels;  ///< known ones, (x, y); others are found in the black frames
+
+  double max_code() const { return static_cast<double>((1 << bit_depth) - 1); }
+  double full_scale_electrons() const {
+    return gain_electrons_per_code * (max_code() - black_level);
+  }
+};
+
+/// What the capture believes of its projector, whose light falls perpendicular on the lit face:
+///
+///   (column mm, row mm) = ((x - offset_x_px), (y - offset_y_px)) . mm_per_pixel          x, y in
+///   projector pixels irradiance = peak . vignetting . (black_level + (1 - black_level)
+///   (code/255)^gamma)
+struct ProjectorCalibration {
+  int width = 640;
+  int height = 480;
+  double mm_per_pixel = 0.05;
+  double offset_x_px = 80.0;  ///< the projector pixel at which the lit face's first column begins
+  double offset_y_px = 0.0;
+  double gamma = 2.2;
+  double black_level = 0.001;  ///< light at code 0, as a fraction of the peak
+  Vignetting vignetting;       ///< about the middle of the projector's picture
+  std::array<double, 3> peak_irradiance{
+      1e-3, 1e-3, 1e-3};  ///< at code 255 in the middle, W/mm^2, per channel
+};
+
+/// Everything measured beforehand about a station; read from the rig file.
+struct StationCalibration {
+  CameraCalibration camera;
+  ProjectorCalibration projector;
+};
+
+Result<void> validate(const StationCalibration& calibration);
+
+/// The signal in electrons behind a code, and how far apart two neighbouring codes are there.
+struct Electrons {
+  double signal = 0.0;
+  double per_code = 1.0;
+};
+Electrons electrons_from_code(const CameraCalibration& camera, double code);
+
+/// Vignetting of each camera pixel, 1 channel.
+Image<float> camera_vignetting(const CameraCalibration& camera);
+
+}  // namespace opaline::capture

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+
+#include "base/block.h"
+#include "base/result.h"
+
+namespace opaline::capture {
+
+/// Which exposures a bracket is chosen from: whole turns of the projector's colour wheel.
+struct ExposureOptions {
+  std::chrono::nanoseconds shortest{33'333'333};    ///< > 0
+  std::chrono::nanoseconds longest{8'000'000'000};  ///< >= shortest
+  double ratio = 4.0;  ///< each exposure over the one before; > 1, at most 16
+  double wanted_snr =
+      50.0;  ///< of a dark pixel on the sample: longer exposures are added until it is met; > 0
+  double dark_quantile = 0.05;  ///< which pixel counts as dark; 0 to 0.5
+};
+
+/// Which lights the sample is measured under.
+struct PatternOptions {
+  int regions = 4;          ///< n: the lit face in n x n regions; 1 to 32
+  int held_out_lights = 8;  ///< shifted by half a region, twice as large, half as large: never used
+                            ///< in the fit; 0 to 8
+};
+
+/// How a session is captured.
+struct CaptureOptions {
+  PatternOptions patterns;
+  ExposureOptions exposures;
+  int retries =
+      3;  ///< times a region is taken again after a bad frame before the session stops; 0 to 100
+  int settle_periods = 2;  ///< projector frames to wait on top of its latency; 0 to 1000
+  double min_coverage =
+      0.5;  ///< share of a surface cell that usable camera pixels must see; 0 < c <= 1
+  double direct_light_margin_mm =
+      3.0;  ///< around a lit region that shares its face with the camera's view: masked; >= 0
+  double usable_share =
+      0.5;  ///< of the regions: fewer usable ones end the session with an error; 0 to 1
+};
+
+/// The sample, as the session describes it.
+struct SampleGeometry {
+  Block block{48, 48, 12, 0.5, 0.5, 0.5};
+  double ior = 1.3;
+  Face lit_face = Face::kZMin;
+  Face seen_face = Face::kZMax;
+};
+
+/// "capture.exposures.ratio = 0.8; expected > 1 and at most 16"
+Result<void> validate(const CaptureOptions& options);
+
+}  // namespace opaline::capture
