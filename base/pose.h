@@ -43,4 +43,16 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
+/// camera_from_sample of a camera at `centre` that looks at `target`, the picture's top towards
+/// `up` (not parallel to the line of sight): X right, Y down, Z forward.
+inline Pose look_at(Vec3 centre, Vec3 target, Vec3 up) {
+  const Vec3 forward = normalized(target - centre);
+  const Vec3 right = normalized(cross(forward, up));
+  const Vec3 down = cross(forward, right);
+  Pose pose{{right.x, right.y, right.z, down.x, down.y, down.z, forward.x, forward.y, forward.z},
+            {}};
+  pose.translation = pose.rotate(centre) * -1.0;
+  return pose;
+}
+
 }  // namespace opaline
