@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "base/dataset.h"
+#include "base/ensure.h"
+#include "reconstruct/diffusion/boundary.h"
+#include "reconstruct/diffusion/camera_equation.h"
+#include "reconstruct/inverse_options.h"
+
+namespace opaline::reconstruct {
+
+/// One illumination in one colour channel. Shapes: rasters over the cells of the lit or the seen
+/// face.
+struct ChannelIllumination {
+  std::vector<double> irradiance;  ///< q = (1 - R(0)) E on the lit face, transmitted, W/mm^2
+  std::vector<double> radiance;    ///< L* on the seen face, W/(mm^2 sr)
+  std::vector<double> weight;      ///< w = 1 / (variance + (model_error L*)^2); 0 where masked
+};
+
+/// One colour channel of a dataset, as the objective reads it.
+struct ChannelProblem {
+  Block block;
+  Face lit_face = Face::kZMin;
+  Face seen_face = Face::kZMax;
+  diffusion::Boundary boundary;
+  diffusion::SourceOptions source;
+  std::vector<diffusion::CameraEquation> camera;  ///< per cell of the seen face
+  std::vector<ChannelIllumination> illuminations;
+  std::size_t data_count = 0;  ///< data of weight > 0
+};
+
+/// Which illuminations of a dataset a problem takes.
+enum class Selection : std::uint8_t { kFit, kHeldOut, kAll };
+
+/// Errors: kInvalidArgument, naming the illumination, when shapes differ, values are not finite or
+/// negative where that cannot be, a variance is missing, or nothing is left to fit.
+Result<ChannelProblem> make_channel_problem(const Dataset& dataset,
+                                            int channel,
+                                            const InverseOptions& options,
+                                            Selection selection);
+
+}  // namespace opaline::reconstruct

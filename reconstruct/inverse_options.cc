@@ -1,0 +1,54 @@
+#include "reconstruct/inverse_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace opaline::reconstruct {
+namespace {
+
+Error expected(std::string_view name, double value, std::string_view range) {
+  return invalid_argument(fmt::format("{} = {}; expected {}", name, value, range));
+}
+
+Result<void> validate_bounds(std::string_view name, const CoefficientBounds& bounds) {
+  if (bounds.lowest > 0.0 && bounds.highest > bounds.lowest && std::isfinite(bounds.highest)) {
+    return ok();
+  }
+  return invalid_argument(fmt::format(
+      "{} bounds = [{}, {}]; expected 0 < lowest < highest", name, bounds.lowest, bounds.highest));
+}
+
+bool not_negative(double value) { return value >= 0.0 && std::isfinite(value); }
+
+}  // namespace
+
+std::string_view to_string(BackEnd back_end) {
+  switch (back_end) {
+    case BackEnd::kAuto:
+      return "auto";
+    case BackEnd::kHost:
+      return "host";
+    case BackEnd::kVulkan:
+      return "vulkan";
+    case BackEnd::kReference:
+      return "reference";
+  }
+  return "auto";
+}
+
+Result<void> validate(const InverseOptions& o) {
+  if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");
+  if (!not_negative(o.regularization)) return expected("regularization", o.regularization, ">= 0");
+  if (o.max_iterations < 0) return expected("max_iterations", o.max_iterations, ">= 0");
+  if (!(o.tolerance > 0.0 && o.tolerance < 1.0))
+    return expected("tolerance", o.tolerance, "> 0 and < 1");
+  if (!not_negative(o.discrepancy)) return expected("discrepancy", o.discrepancy, ">= 0");
+  if (!not_negative(o.stalled)) return expected("stalled", o.stalled, ">= 0");
+  if (o.checkpoint_every < 1) return expected("checkpoint_every", o.checkpoint_every, ">= 1");
+  if (o.threads < 0) return expected("threads", o.threads, ">= 0");
+  if (auto valid = validate_bounds("absorption", o.absorption); !valid) return valid;
+  return validate_bounds("reduced_scattering", o.reduced_scattering);
+}
+
+}  // namespace opaline::reconstruct

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "base/result.h"
+#include "reconstruct/diffusion/boundary.h"
+#include "reconstruct/diffusion/source.h"
+
+namespace opaline::reconstruct {
+
+/// Which implementation of the diffusion solver computes.
+enum class BackEnd : std::uint8_t {
+  kAuto,       ///< a Vulkan device that is not a CPU, else host
+  kHost,       ///< threads and SIMD
+  kVulkan,     ///< compute shaders
+  kReference,  ///< plain loops in double, for tests
+};
+std::string_view to_string(BackEnd back_end);  ///< "auto" | "host" | "vulkan" | "reference"
+
+/// Bounds of a coefficient, 1/mm; 0 < lowest < highest.
+struct CoefficientBounds {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
+
+/// How a dataset is inverted.
+struct InverseOptions {
+  diffusion::SourceModel source = diffusion::SourceModel::kCollimated;
+  diffusion::Deposit deposit = diffusion::Deposit::kCentroid;
+  diffusion::BoundaryModel boundary = diffusion::BoundaryModel::kTwoMoment;
+  /// Relative error of the diffusion model itself, added to the variance of each datum as
+  /// (model_error L)^2; >= 0.
+  double model_error = 0.01;
+  /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
+  double regularization = 1.0;
+  int max_iterations = 150;  ///< of L-BFGS, per channel; 0 keeps the homogeneous fit
+  double tolerance = 1e-6;   ///< of every diffusion solve, relative residual; > 0
+  /// Discrepancy principle: stop once chi^2 <= discrepancy times the number of data; >= 0, 0 never
+  /// stops so.
+  double discrepancy = 1.0;
+  /// Stop when the objective falls by less than this fraction over ten iterations; >= 0.
+  double stalled = 1e-3;
+  CoefficientBounds absorption{1e-5, 10.0};
+  CoefficientBounds reduced_scattering{0.02, 100.0};
+  int checkpoint_every = 10;  ///< iterations of L-BFGS; >= 1
+  BackEnd back_end = BackEnd::kAuto;
+  int threads = 0;  ///< of the host back end; 0: one a core
+};
+Result<void> validate(const InverseOptions& options);  ///< "tolerance = 0; expected > 0"
+
+}  // namespace opaline::reconstruct
