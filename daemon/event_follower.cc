@@ -1,0 +1,18 @@
+#include "daemon/event_follower.h"
+
+#include <system_error>
+
+namespace opaline::daemon {
+
+Result<std::vector<Event>> EventFollower::poll() {
+  std::error_code missing;
+  const std::uint64_t size = std::filesystem::file_size(log_, missing);
+  if (missing || size == seen_size_) return std::vector<Event>{};
+  Result<EventBatch> batch = read_events(log_, offset_);
+  if (!batch) return batch.error();
+  offset_ = batch->next_offset;
+  seen_size_ = size;
+  return std::move(batch->events);
+}
+
+}  // namespace opaline::daemon

@@ -1,0 +1,177 @@
+#include "daemon/supervisor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "base/lock.h"
+#include "daemon/jobs/station_lock.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_directory.h"
+
+namespace opaline::daemon {
+namespace {
+
+using testing::eventually;
+using ::testing::HasSubstr;
+
+/// Sessions on the fake stages, supervised step by step or by a thread.
+class Supervision : public ::testing::Test {
+ protected:
+  Supervision() {
+    std::filesystem::create_directories(switches_);
+    ::setenv("OPALINE_FAKE_DIR", switches_.c_str(), 1);
+    ::setenv("OPALINE_LOCK_DIR", root_.path().c_str(), 1);
+    ::setenv("OPALINE_FAKE_STATION", "bench", 1);
+  }
+
+  SessionDirectory make_session(const std::string& id) const {
+    return *SessionDirectory::create(system_files(), root_.path() / id, {id, "", "", ""});
+  }
+  void turn_on(const std::string& what, const std::string& text = "") const {
+    std::ofstream(switches_ / what) << text;
+  }
+  void turn_off(const std::string& what) const { std::filesystem::remove(switches_ / what); }
+  std::unique_ptr<Supervisor> make_supervisor() {
+    return std::make_unique<Supervisor>(
+        neighbours_,
+        Supervisor::Hooks{[](const SessionDirectory&) { return station_lock_path("bench"); },
+                          [](const SessionSnapshot&) {}},
+        Supervisor::Options{std::chrono::milliseconds(5)});
+  }
+  static SessionState state_of(const SessionDirectory& session) {
+    const auto snapshot = read_snapshot(session);
+    return snapshot ? snapshot->state : SessionState::kQueued;
+  }
+  static bool becomes(const SessionDirectory& session, SessionState state) {
+    return eventually([&] { return state_of(session) == state; });
+  }
+
+  testing::TemporaryDirectory root_;
+  std::filesystem::path switches_ = root_.path() / "switches";
+  LocalExecutor executor_{std::getenv("OPALINE_FAKES")};
+  SystemClock clock_;
+  SessionSupervisor::Neighbours neighbours_{executor_, system_files(), clock_};
+};
+
+TEST_F(Supervision, TakesASessionThroughAllStages) {
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+
+  EXPECT_TRUE(becomes(session, SessionState::kSucceeded));
+  EXPECT_TRUE(std::filesystem::exists(session.path() / "preview.html"));
+}
+
+TEST_F(Supervision, StartsAJobThatDiedAgain) {
+  turn_on("capture.die", "2");
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+
+  EXPECT_TRUE(becomes(session, SessionState::kSucceeded));
+}
+
+TEST_F(Supervision, GivesUpOnAJobThatAlwaysDiesAndSaysSoInTheLog) {
+  turn_on("capture.die", "99");
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+
+  EXPECT_TRUE(becomes(session, SessionState::kFailed));
+  EXPECT_THAT(read_snapshot(session)->message, HasSubstr("died 3 times"));
+}
+
+TEST_F(Supervision, SaysWhenAProgramIsMissing) {
+  LocalExecutor nowhere(root_.path() / "nowhere");
+  const SessionDirectory session = make_session("a");
+  SessionSupervisor supervisor(session, {}, {nowhere, system_files(), clock_});
+  BusyStations stations;
+  ASSERT_TRUE(supervisor.step(stations));
+  const auto snapshot = supervisor.step(stations);
+
+  ASSERT_TRUE(snapshot);
+  EXPECT_EQ(snapshot->state, SessionState::kFailed);
+  EXPECT_THAT(snapshot->message, HasSubstr("nowhere/opaline-capture"));
+}
+
+TEST_F(Supervision, StopsAtAStageThatFailsAndGoesOnWhenResumed) {
+  turn_on("reconstruct.fail", "no memory");
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(becomes(session, SessionState::kFailed));
+  EXPECT_EQ(read_snapshot(session)->message, "no memory");
+
+  turn_off("reconstruct.fail");
+  ASSERT_TRUE(SessionSupervisor(session, {}, neighbours_).resume());
+  ASSERT_TRUE(eventually([&] {
+    supervisor->add(session);  // once it has let go of the failed one
+    return state_of(session) == SessionState::kSucceeded;
+  }));
+}
+
+TEST_F(Supervision, QueuesTwoSessionsOnOneStation) {
+  turn_on("capture.hold");
+  const SessionDirectory first = make_session("a");
+  const SessionDirectory second = make_session("b");
+  const auto supervisor = make_supervisor();
+  supervisor->add(first);
+  supervisor->add(second);
+
+  EXPECT_TRUE(eventually([&] {
+    const auto snapshot = supervisor->snapshot("b");
+    return snapshot && snapshot->state == SessionState::kWaiting;
+  }));
+  EXPECT_TRUE(becomes(first, SessionState::kRunning));
+  turn_off("capture.hold");
+  EXPECT_TRUE(becomes(first, SessionState::kSucceeded));
+  EXPECT_TRUE(becomes(second, SessionState::kSucceeded));
+}
+
+TEST_F(Supervision, CancelsARunningSession) {
+  turn_on("capture.hold");
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(becomes(session, SessionState::kRunning));
+
+  EXPECT_TRUE(supervisor->cancel("a"));
+
+  EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+}
+
+TEST_F(Supervision, CancelsASessionThatWaits) {
+  const auto station = lock_station("bench");
+  ASSERT_TRUE(station);
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(eventually([&] { return supervisor->snapshot("a").has_value(); }));
+
+  EXPECT_TRUE(supervisor->cancel("a"));
+
+  EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+}
+
+TEST_F(Supervision, GoesOnWhereAnotherSupervisorStopped) {
+  turn_on("capture.hold");
+  const SessionDirectory session = make_session("a");
+  make_supervisor()->add(session);  // starts the job, then is gone
+  std::unique_ptr<Supervisor> supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(becomes(session, SessionState::kRunning));
+  supervisor.reset();
+  ASSERT_EQ(state_of(session), SessionState::kRunning);
+
+  supervisor = make_supervisor();
+  supervisor->add(session);
+  turn_off("capture.hold");
+
+  EXPECT_TRUE(becomes(session, SessionState::kSucceeded));
+}
+
+}  // namespace
+}  // namespace opaline::daemon
