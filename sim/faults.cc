@@ -41,16 +41,27 @@ Result<FaultKind> fault_from_name(std::string_view name) {
 }
 
 bool FaultPlan::strikes(FaultKind kind, std::uint64_t pattern) {
+  const auto fault = due(kind, pattern);
+  if (fault == faults_.end()) return false;
+  if (--fault->count <= 0) faults_.erase(fault);
+  return true;
+}
+
+int FaultPlan::strikes_for_good(FaultKind kind, std::uint64_t pattern) {
+  const auto fault = due(kind, pattern);
+  if (fault == faults_.end()) return 0;
+  const int count = fault->count;
+  faults_.erase(fault);
+  return count;
+}
+
+Faults::iterator FaultPlan::due(FaultKind kind, std::uint64_t pattern) {
   const auto fault = std::find_if(faults_.begin(), faults_.end(), [&](const Fault& f) {
     return f.kind == kind && (f.pattern == 0 || f.pattern == pattern);
   });
-  if (fault == faults_.end()) return false;
-  if (fault->skip > 0) {
-    --fault->skip;
-    return false;
-  }
-  if (--fault->count <= 0) faults_.erase(fault);
-  return true;
+  if (fault == faults_.end() || fault->skip == 0) return fault;
+  --fault->skip;
+  return faults_.end();
 }
 
 }  // namespace opaline::sim

@@ -58,9 +58,12 @@ class FaultPlan {
   void arm(Faults faults) { faults_ = std::move(faults); }
   /// Whether a fault of this kind strikes this event; uses it up.
   bool strikes(FaultKind kind, std::uint64_t pattern);
+  /// The same, but uses the whole of it up and returns its count; 0 = none strikes.
+  int strikes_for_good(FaultKind kind, std::uint64_t pattern);
   const Faults& left() const { return faults_; }
 
  private:
+  Faults::iterator due(FaultKind kind, std::uint64_t pattern);
   Faults faults_;
 };
 

@@ -1,0 +1,361 @@
+#include "sim/rig.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "base/log.h"
+
+namespace opaline::sim {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr std::size_t kRenderedKept = 16;
+constexpr nanoseconds kSlowLight = std::chrono::seconds(1);
+
+double seconds(nanoseconds duration) { return std::chrono::duration<double>(duration).count(); }
+
+std::uint64_t content_hash(const Image<std::uint8_t>& codes) {
+  std::uint64_t hash =
+      mix(static_cast<std::uint64_t>(codes.width()), static_cast<std::uint64_t>(codes.height()));
+  const std::span<const std::uint8_t> bytes = codes.samples();
+  for (std::size_t i = 0; i < bytes.size(); i += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, &bytes[i], std::min(sizeof(word), bytes.size() - i));
+    hash = mix(hash, word);
+  }
+  return hash;
+}
+
+Result<void> check(const TransportResponses& r) {
+  if (r.patches_x < 1 || r.patches_y < 1 ||
+      r.patches.size() != static_cast<std::size_t>(r.patches_x) * r.patches_y) {
+    return invalid_argument(fmt::format(
+        "{} responses for {} x {} patches", r.patches.size(), r.patches_x, r.patches_y));
+  }
+  for (const PatchResponse& patch : r.patches) {
+    if (patch.radiance.width() != r.block.face_width(r.seen_face) ||
+        patch.radiance.height() != r.block.face_height(r.seen_face) ||
+        patch.radiance.channels() != 3) {
+      return invalid_argument("a response's size is not that of the seen face's cells");
+    }
+  }
+  return ok();
+}
+
+}  // namespace
+
+/// One exposure from trigger to delivery, with the faults that strike it.
+struct Rig::Exposure {
+  std::uint64_t session = 0;
+  nanoseconds start{};
+  nanoseconds requested{};
+  nanoseconds measured{};
+  std::uint64_t key = 0;  ///< of all its randomness
+  int camera_lost = 0;
+  bool missing = false;
+};
+
+Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
+                                         std::shared_ptr<const TransportResponses> responses,
+                                         Clock* clock) {
+  if (auto good = validate(options); !good) return good.error().in("rig");
+  if (auto good = check(*responses); !good) return good.error().in("transport responses");
+  return std::unique_ptr<Rig>(new Rig(options, std::move(responses), clock));
+}
+
+Rig::Rig(const RigOptions& options,
+         std::shared_ptr<const TransportResponses> responses,
+         Clock* clock)
+    : options_(options),
+      own_clock_(options.time_factor),
+      clock_(clock == nullptr ? *own_clock_ : *clock),
+      optics_(options.camera, options.projector, std::move(responses)),
+      sensor_(options.camera, options.seed),
+      next_session_(
+          static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count())) {
+  plan_.arm(options.faults);
+}
+
+Result<RigPort::Opened<drivers::CameraInfo>> Rig::open_camera() {
+  const std::lock_guard lock(mutex_);
+  if (camera_opens_to_fail_ > 0) {
+    --camera_opens_to_fail_;
+    return unavailable("simulated camera: unplugged");
+  }
+  camera_session_ = ++next_session_;
+  trigger_count_ = 0;
+  last_frame_.reset();
+  return Opened<drivers::CameraInfo>{camera_session_,
+                                     {"simulated camera",
+                                      fmt::format("sim-{}", options_.seed),
+                                      options_.camera.model.width,
+                                      options_.camera.model.height,
+                                      options_.camera.bit_depth,
+                                      options_.camera.shortest_exposure,
+                                      options_.camera.longest_exposure}};
+}
+
+Result<RigPort::Opened<drivers::ProjectorInfo>> Rig::open_projector() {
+  const std::lock_guard lock(mutex_);
+  if (projector_opens_to_fail_ > 0) {
+    --projector_opens_to_fail_;
+    return unavailable("simulated projector: unplugged");
+  }
+  projector_session_ = ++next_session_;
+  darken();
+  return Opened<drivers::ProjectorInfo>{projector_session_,
+                                        {"simulated projector",
+                                         fmt::format("sim-{}", options_.seed),
+                                         options_.projector.width,
+                                         options_.projector.height,
+                                         options_.projector.wheel_turn,
+                                         options_.projector.latency}};
+}
+
+void Rig::close_camera(std::uint64_t session) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (session == camera_session_) camera_session_ = 0;
+}
+
+void Rig::close_projector(std::uint64_t session) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (session != projector_session_) return;
+  projector_session_ = 0;
+  darken();
+}
+
+Result<void> Rig::dark() {
+  const std::lock_guard lock(mutex_);
+  darken();
+  return ok();
+}
+
+void Rig::darken() {
+  const nanoseconds now = clock_.now();
+  const Shown shown = timeline_.at(now);
+  if (plan_.strikes(FaultKind::kLampStuck, shown ? shown->id : 0)) return;
+  timeline_.change(now, nullptr);
+}
+
+Shown Rig::render(const drivers::Pattern& pattern) {
+  const std::uint64_t content = content_hash(pattern.codes);
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [key, light] : rendered_) {
+      if (key == content)
+        return std::make_shared<ShownPattern>(ShownPattern{pattern.id, content, light});
+    }
+  }
+  auto light = std::make_shared<const StationLight>(optics_.light(pattern.codes));
+  const std::lock_guard lock(mutex_);
+  rendered_.emplace_back(content, light);
+  if (rendered_.size() > kRenderedKept) rendered_.pop_front();
+  return std::make_shared<ShownPattern>(ShownPattern{pattern.id, content, std::move(light)});
+}
+
+Result<void> Rig::show(std::uint64_t session,
+                       const drivers::Pattern& pattern,
+                       std::stop_token stop) {
+  if (stop.stop_requested()) return cancelled("show: stopped");
+  const auto& projector = options_.projector;
+  const auto& codes = pattern.codes;
+  if (pattern.id == 0) return invalid_argument("pattern id 0; expected > 0");
+  if (codes.width() != projector.width || codes.height() != projector.height ||
+      codes.channels() != 3) {
+    return invalid_argument(fmt::format("pattern {}: {} x {} x {}; expected {} x {} x 3",
+                                        pattern.id,
+                                        codes.width(),
+                                        codes.height(),
+                                        codes.channels(),
+                                        projector.width,
+                                        projector.height));
+  }
+  Shown shown = render(pattern);
+  const std::lock_guard lock(mutex_);
+  if (session == 0 || session != projector_session_)
+    return unavailable("simulated projector: not open");
+  if (const int count = plan_.strikes_for_good(FaultKind::kProjectorLost, pattern.id); count > 0) {
+    projector_session_ = 0;
+    projector_opens_to_fail_ = count - 1;
+    return unavailable("simulated projector: unplugged");
+  }
+  if (plan_.strikes(FaultKind::kPatternStuck, pattern.id)) return ok();
+  const bool slow = plan_.strikes(FaultKind::kSlowProjector, pattern.id);
+  timeline_.change(clock_.now() + projector.latency + (slow ? kSlowLight : nanoseconds(0)),
+                   std::move(shown));
+  return ok();
+}
+
+Result<Rig::Exposure> Rig::trigger(std::uint64_t session, nanoseconds requested) {
+  const CameraOptics& camera = options_.camera;
+  if (requested < camera.shortest_exposure || requested > camera.longest_exposure) {
+    return invalid_argument(fmt::format("exposure of {} s; expected {} to {} s",
+                                        seconds(requested),
+                                        seconds(camera.shortest_exposure),
+                                        seconds(camera.longest_exposure)));
+  }
+  const std::lock_guard lock(mutex_);
+  if (session == 0 || session != camera_session_) return unavailable("simulated camera: not open");
+  if (exposing_session_ == session) return busy("simulated camera: exposing");
+
+  Exposure e{.session = session, .start = clock_.now(), .requested = requested};
+  const Shown shown = timeline_.at(e.start);
+  const std::uint64_t id = shown ? shown->id : 0;
+  e.key = mix(mix(mix(options_.seed, id), shown ? shown->content : 0),
+              static_cast<std::uint64_t>(requested.count()));
+  const double z = std::clamp(normal_quantile(uniform(mix(e.key, 0x657870))), -3.0, 3.0);
+  const double third = plan_.strikes(FaultKind::kWrongExposure, id) ? 4.0 / 3.0 : 1.0;
+  e.measured = nanoseconds(std::llround(static_cast<double>(requested.count()) * third *
+                                        (1.0 + camera.exposure_error * z)));
+  e.camera_lost = plan_.strikes_for_good(FaultKind::kCameraLost, id);
+  e.missing = plan_.strikes(FaultKind::kMissingFrame, id);
+  exposing_session_ = session;
+  return e;
+}
+
+Result<Frame> Rig::expose(std::uint64_t session, nanoseconds exposure, std::stop_token stop) {
+  if (stop.stop_requested()) return cancelled("exposure: stopped");
+  const Result<Exposure> triggered = trigger(session, exposure);
+  if (!triggered) return triggered.error();
+  Result<Frame> frame = [&]() -> Result<Frame> {
+    if (triggered->camera_lost > 0 || triggered->missing) return fail_later(*triggered, stop);
+    if (!clock_.sleep(triggered->measured, stop)) return cancelled("exposure: stopped");
+    return finish(*triggered);
+  }();
+  const std::lock_guard lock(mutex_);
+  if (exposing_session_ == session) exposing_session_ = 0;
+  return frame;
+}
+
+Result<Frame> Rig::fail_later(const Exposure& exposure, std::stop_token stop) {
+  if (exposure.camera_lost > 0) {
+    if (!clock_.sleep(exposure.measured / 2, stop)) return cancelled("exposure: stopped");
+    const std::lock_guard lock(mutex_);
+    camera_session_ = 0;
+    camera_opens_to_fail_ = exposure.camera_lost - 1;
+    return unavailable("simulated camera: unplugged");
+  }
+  const nanoseconds patience = exposure.requested * 3 / 2 + std::chrono::seconds(2);
+  if (!clock_.sleep(patience, stop)) return cancelled("exposure: stopped");
+  return timeout(fmt::format("simulated camera: no frame after {} s", seconds(patience)));
+}
+
+Result<Frame> Rig::finish(Exposure exposure) {
+  std::vector<LightStretch> lights;
+  {
+    const std::lock_guard lock(mutex_);
+    if (camera_session_ != exposure.session) return cancelled("exposure: camera closed");
+    lights = timeline_.during(exposure.start, exposure.measured);
+    const Shown shown = lights.front().shown;
+    if (plan_.strikes(FaultKind::kStaleFrame, shown ? shown->id : 0)) {
+      lights = {{timeline_.before(exposure.start), 0.0, seconds(exposure.measured)}};
+    }
+  }
+  Frame frame;
+  frame.pattern_id = lights.size() == 1 && lights[0].shown ? lights[0].shown->id : 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (plan_.strikes(FaultKind::kBlackFrame, frame.pattern_id)) lights = {};
+  }
+  frame.pixels = picture(exposure, lights);
+  frame.sha256 = frame_hash(frame.pixels);
+  frame.bit_depth = options_.camera.bit_depth;
+  frame.start = exposure.start;
+  frame.exposure = exposure.measured;
+  deliver(exposure, frame);
+  return frame;
+}
+
+Image<std::uint16_t> Rig::picture(const Exposure& exposure,
+                                  const std::vector<LightStretch>& lights) const {
+  const double turn = seconds(options_.projector.wheel_turn);
+  const double phase = turn * uniform(mix(exposure.key, 0x7768656c));
+  Image<float> sum(options_.camera.model.width, options_.camera.model.height, 3);
+  for (const LightStretch& stretch : lights) {
+    if (!stretch.shown) continue;
+    const Rgb lit =
+        wheel_lit_seconds(turn, phase + stretch.from_seconds, phase + stretch.to_seconds);
+    const std::span<const float> radiance = stretch.shown->light->sensor_radiance.samples();
+    for (std::size_t i = 0; i < radiance.size(); ++i) {
+      sum.samples()[i] += static_cast<float>(lit[i % 3]) * radiance[i];
+    }
+  }
+  return sensor_.read(sum, seconds(exposure.measured), exposure.key);
+}
+
+/// Numbers the frame, and damages it on the way out where a fault says so.
+void Rig::deliver(const Exposure& exposure, Frame& frame) {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t id = frame.pattern_id;
+  ++exposures_;
+  if (last_frame_ && plan_.strikes(FaultKind::kDuplicateFrame, id)) {
+    frame = *last_frame_;
+    return;
+  }
+  trigger_count_ += plan_.strikes(FaultKind::kSkippedTrigger, id) ? 2 : 1;
+  frame.trigger_count = trigger_count_;
+  const Frame intact = frame;
+  if (plan_.strikes(FaultKind::kTornFrame, id)) {
+    const std::span<std::uint16_t> samples = frame.pixels.samples();
+    const auto lower = samples.subspan(samples.size() / 2);
+    std::fill(lower.begin(), lower.end(), std::uint16_t{0});
+    if (last_frame_ && last_frame_->pixels != intact.pixels) {
+      const auto old = last_frame_->pixels.samples().subspan(samples.size() / 2);
+      std::copy(old.begin(), old.end(), lower.begin());
+    }
+  }
+  if (last_frame_ && plan_.strikes(FaultKind::kTimeBackwards, id)) {
+    frame.start = last_frame_->start - std::chrono::milliseconds(1);
+  }
+  log::debug("simulated camera: frame {}, pattern {}, {} s",
+             frame.trigger_count,
+             id,
+             seconds(exposure.measured));
+  last_frame_ = intact;
+}
+
+Result<RigStatus> Rig::status() {
+  const std::lock_guard lock(mutex_);
+  const nanoseconds now = clock_.now();
+  const Shown shown = timeline_.at(now);
+  return RigStatus{.lamp_on = shown != nullptr,
+                   .pattern_id = shown ? shown->id : 0,
+                   .exposures = exposures_,
+                   .camera_open = camera_session_ != 0,
+                   .projector_open = projector_session_ != 0,
+                   .rig_time = now,
+                   .time_factor = options_.time_factor,
+                   .faults = plan_.left()};
+}
+
+Result<RigTruth> Rig::truth() {
+  const std::lock_guard lock(mutex_);
+  const Shown shown = timeline_.at(clock_.now());
+  const TransportResponses& responses = optics_.responses();
+  RigTruth truth{.scene = responses.scene,
+                 .pattern_id = shown ? shown->id : 0,
+                 .patches_x = responses.patches_x,
+                 .patches_y = responses.patches_y,
+                 .patch_irradiance = std::vector<Rgb>(responses.patches.size(), Rgb{}),
+                 .surface_radiance = Image<float>(responses.block.face_width(responses.seen_face),
+                                                  responses.block.face_height(responses.seen_face),
+                                                  3)};
+  if (shown) {
+    truth.patch_irradiance = shown->light->patch_irradiance;
+    truth.surface_radiance = shown->light->surface_radiance;
+  }
+  return truth;
+}
+
+Result<void> Rig::arm(const Faults& faults) {
+  const std::lock_guard lock(mutex_);
+  plan_.arm(faults);
+  camera_opens_to_fail_ = projector_opens_to_fail_ = 0;
+  return ok();
+}
+
+}  // namespace opaline::sim

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+
+#include "drivers/projector.h"
+#include "sim/rig_port.h"
+
+namespace opaline::sim {
+
+/// The simulated station's projector: drivers::Projector over a RigPort, which outlives it. dark()
+/// works also while closed, so that a guardian need not open the device, which would take it from
+/// whoever has it. The lamp stays as it is when this process dies without close().
+class SimProjector : public drivers::Projector {
+ public:
+  explicit SimProjector(RigPort& rig) : rig_(rig) {}
+  ~SimProjector() override { close_session(); }
+
+  Result<void> open() override;
+  Result<drivers::ProjectorInfo> info() const override;
+  Result<void> show(const drivers::Pattern& pattern, std::stop_token stop) override;
+  Result<void> dark() override { return rig_.dark(); }
+  void close() noexcept override { close_session(); }
+
+ private:
+  void close_session() noexcept;
+
+  RigPort& rig_;
+  mutable std::mutex mutex_;
+  std::uint64_t session_ = 0;    // guarded by mutex_; 0: closed
+  drivers::ProjectorInfo info_;  // guarded by mutex_
+};
+
+}  // namespace opaline::sim

@@ -1,0 +1,210 @@
+#include "sim/station_light.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace opaline::sim {
+namespace {
+
+constexpr int kSubsamples = 4;  ///< per pixel and axis, when its area is shared among cells
+
+struct FacePoint {
+  double column = 0.0;  ///< in cells
+  double row = 0.0;
+};
+
+double component(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// Where the ray through a camera's pixel position meets the plane of a face, in cells.
+class FaceView {
+ public:
+  FaceView(const CameraModel& camera, const Block& block, Face face)
+      : camera_(camera),
+        centre_(camera.centre()),
+        normal_axis_(axis_of(face)),
+        column_axis_(normal_axis_ == 0 ? 1 : 0),
+        row_axis_(normal_axis_ == 2 ? 1 : 2),
+        plane_(is_max(face) ? component(block.size(), normal_axis_) : 0.0),
+        spacing_(block.spacing()) {}
+
+  std::optional<FacePoint> at(double x, double y) const {
+    const Vec3 direction = camera_.ray_direction({x, y});
+    const double t =
+        (plane_ - component(centre_, normal_axis_)) / component(direction, normal_axis_);
+    if (!(t > 0.0) || !std::isfinite(t)) return std::nullopt;
+    const Vec3 hit = centre_ + direction * t;
+    return FacePoint{component(hit, column_axis_) / spacing_[column_axis_],
+                     component(hit, row_axis_) / spacing_[row_axis_]};
+  }
+
+ private:
+  CameraModel camera_;
+  Vec3 centre_;
+  int normal_axis_;
+  int column_axis_;
+  int row_axis_;
+  double plane_;
+  std::array<double, 3> spacing_;
+};
+
+/// The corners of a row of pixels; a pixel is small enough to be linear between its corners.
+std::vector<std::optional<FacePoint>> corner_row(const FaceView& view, int width, int y) {
+  std::vector<std::optional<FacePoint>> corners;
+  for (int x = 0; x <= width; ++x) corners.push_back(view.at(x, y));
+  return corners;
+}
+
+FacePoint between(const std::array<FacePoint, 4>& corners, double u, double v) {
+  const auto lerp = [&](auto member) {
+    const double top = (1.0 - u) * corners[0].*member + u * corners[1].*member;
+    const double bottom = (1.0 - u) * corners[2].*member + u * corners[3].*member;
+    return (1.0 - v) * top + v * bottom;
+  };
+  return {lerp(&FacePoint::column), lerp(&FacePoint::row)};
+}
+
+/// Cells of a width x height raster that lie under the quadrilateral, by supersampling.
+std::vector<std::pair<std::uint32_t, int>> cells_under(const std::array<FacePoint, 4>& corners,
+                                                       int width,
+                                                       int height) {
+  std::vector<std::pair<std::uint32_t, int>> hits;
+  for (int j = 0; j < kSubsamples; ++j) {
+    for (int i = 0; i < kSubsamples; ++i) {
+      const FacePoint p = between(corners, (i + 0.5) / kSubsamples, (j + 0.5) / kSubsamples);
+      const double column = std::floor(p.column);
+      const double row = std::floor(p.row);
+      if (!(column >= 0.0 && row >= 0.0 && column < width && row < height)) continue;
+      const auto cell = static_cast<std::uint32_t>(row * width + column);
+      const auto known =
+          std::find_if(hits.begin(), hits.end(), [&](const auto& h) { return h.first == cell; });
+      known == hits.end() ? hits.emplace_back(cell, 1) : (++known->second, *known);
+    }
+  }
+  return hits;
+}
+
+/// Gaussian weights from -radius to radius, normalised.
+std::vector<float> gaussian(double sigma) {
+  const int radius = static_cast<int>(std::ceil(4.0 * sigma));
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (int i = -radius; i <= radius; ++i) {
+    weights.push_back(std::exp(-0.5 * i * i / (sigma * sigma)));
+    sum += weights.back();
+  }
+  std::vector<float> normalised;
+  for (const double weight : weights) normalised.push_back(static_cast<float>(weight / sum));
+  return normalised;
+}
+
+/// -1 -> 0, -2 -> 1, size -> size - 1, and so on for as often as it takes.
+int mirrored(int i, int size) {
+  const int period = 2 * size;
+  const int phase = ((i % period) + period) % period;
+  return phase < size ? phase : period - 1 - phase;
+}
+
+/// Convolves `count` samples that lie `stride` apart, in place.
+void blur_line(float* samples,
+               int count,
+               std::size_t stride,
+               const std::vector<float>& kernel,
+               std::vector<float>& padded) {
+  const int radius = static_cast<int>(kernel.size() / 2);
+  padded.resize(static_cast<std::size_t>(count + 2 * radius));
+  for (int i = -radius; i < count + radius; ++i)
+    padded[i + radius] = samples[mirrored(i, count) * stride];
+  for (int i = 0; i < count; ++i) {
+    float sum = 0.0f;
+    for (std::size_t k = 0; k < kernel.size(); ++k) sum += kernel[k] * padded[i + k];
+    samples[i * stride] = sum;
+  }
+}
+
+}  // namespace
+
+Image<float> blurred(const Image<float>& picture, double sigma_px) {
+  if (sigma_px <= 0.0 || picture.empty()) return picture;
+  const std::vector<float> kernel = gaussian(sigma_px);
+  Image<float> result = picture;
+  const auto channels = static_cast<std::size_t>(picture.channels());
+  const std::size_t row = channels * picture.width();
+  std::vector<float> padded;
+  for (std::size_t i = 0; i < row; ++i)
+    blur_line(&result.samples()[i], picture.height(), row, kernel, padded);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (std::size_t c = 0; c < channels; ++c) {
+      blur_line(&result.samples()[y * row + c], picture.width(), channels, kernel, padded);
+    }
+  }
+  return result;
+}
+
+StationOptics::StationOptics(const CameraOptics& camera,
+                             const ProjectorOptics& projector,
+                             std::shared_ptr<const TransportResponses> responses)
+    : camera_(camera), projector_(projector), responses_(std::move(responses)) {
+  const Block& block = responses_->block;
+  const Face face = responses_->seen_face;
+  const FaceView view(camera.model, block, face);
+  auto above = corner_row(view, camera.model.width, 0);
+  for (int y = 0; y < camera.model.height; ++y) {
+    auto below = corner_row(view, camera.model.width, y + 1);
+    for (int x = 0; x < camera.model.width; ++x) {
+      first_share_.push_back(static_cast<std::uint32_t>(shares_.size()));
+      if (!above[x] || !above[x + 1] || !below[x] || !below[x + 1]) continue;
+      const std::array corners{*above[x], *above[x + 1], *below[x], *below[x + 1]};
+      for (const auto& [cell, hits] :
+           cells_under(corners, block.face_width(face), block.face_height(face))) {
+        shares_.push_back({cell, static_cast<float>(hits) / (kSubsamples * kSubsamples)});
+      }
+    }
+    above = std::move(below);
+  }
+  first_share_.push_back(static_cast<std::uint32_t>(shares_.size()));
+}
+
+StationLight StationOptics::light(const Image<std::uint8_t>& codes) const {
+  StationLight light;
+  light.patch_irradiance = patch_irradiance(projector_,
+                                            responses_->block,
+                                            responses_->lit_face,
+                                            responses_->patches_x,
+                                            responses_->patches_y,
+                                            codes);
+  light.surface_radiance = surface(light.patch_irradiance);
+  light.sensor_radiance = blurred(seen(light.surface_radiance), camera_.psf_sigma_px);
+  return light;
+}
+
+Image<float> StationOptics::surface(const std::vector<Rgb>& patch_irradiance) const {
+  const Block& block = responses_->block;
+  const Face face = responses_->seen_face;
+  Image<float> sum(block.face_width(face), block.face_height(face), 3);
+  for (std::size_t p = 0; p < patch_irradiance.size(); ++p) {
+    const std::span<const float> response = responses_->patches[p].radiance.samples();
+    for (std::size_t i = 0; i < response.size(); ++i) {
+      sum.samples()[i] += static_cast<float>(patch_irradiance[p][i % 3]) * response[i];
+    }
+  }
+  return sum;
+}
+
+Image<float> StationOptics::seen(const Image<float>& surface) const {
+  Image<float> picture(camera_.model.width, camera_.model.height, 3);
+  for (std::size_t pixel = 0; pixel < picture.pixel_count(); ++pixel) {
+    for (std::uint32_t s = first_share_[pixel]; s < first_share_[pixel + 1]; ++s) {
+      const Share& share = shares_[s];
+      for (std::size_t c = 0; c < 3; ++c) {
+        picture.samples()[3 * pixel + c] +=
+            share.weight * surface.samples()[3 * std::size_t{share.cell} + c];
+      }
+    }
+  }
+  return picture;
+}
+
+}  // namespace opaline::sim

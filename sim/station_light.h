@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "base/image.h"
+#include "base/transport_responses.h"
+#include "sim/optics.h"
+
+namespace opaline::sim {
+
+/// What one projector picture does to the sample, without noise and without time.
+struct StationLight {
+  std::vector<Rgb> patch_irradiance;  ///< E on the lit face's patches, W/mm^2
+  Image<float> surface_radiance;  ///< L on the seen face's cells towards the camera, W/(mm^2 sr)
+  Image<float> sensor_radiance;   ///< the same as each camera pixel sees it, PSF included
+};
+
+/// Follows light from the projector through the sample to the camera's pixels: patch irradiances
+/// weight the stored responses (light adds), and every pixel averages the surface cells that its
+/// area sees. Around the seen face, the block's other sides included, the camera sees black.
+///
+/// Threads: const, so any number at a time.
+class StationOptics {
+ public:
+  StationOptics(const CameraOptics& camera,
+                const ProjectorOptics& projector,
+                std::shared_ptr<const TransportResponses> responses);
+
+  StationLight light(const Image<std::uint8_t>& codes) const;
+  const TransportResponses& responses() const { return *responses_; }
+
+ private:
+  Image<float> surface(const std::vector<Rgb>& patch_irradiance) const;
+  Image<float> seen(const Image<float>& surface) const;
+
+  struct Share {
+    std::uint32_t cell;  ///< of the seen face, row-major
+    float weight;        ///< of the pixel's area
+  };
+  CameraOptics camera_;
+  ProjectorOptics projector_;
+  std::shared_ptr<const TransportResponses> responses_;
+  std::vector<std::uint32_t> first_share_;  ///< per pixel, and one behind the last
+  std::vector<Share> shares_;
+};
+
+/// A picture convolved with a Gaussian, mirrored at its borders, so that no light is lost.
+Image<float> blurred(const Image<float>& picture, double sigma_px);
+
+}  // namespace opaline::sim

@@ -1,0 +1,348 @@
+#include "sim/rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <thread>
+
+#include "sim/sim_camera.h"
+#include "sim/sim_projector.h"
+#include "tests/support/simulated_station.h"
+
+namespace opaline::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::nanoseconds;
+
+constexpr nanoseconds kTurn{33'333'333};
+
+/// A tiny station with an opened camera and projector, on a clock that stands still unless somebody
+/// waits.
+class RigTest : public ::testing::Test {
+ protected:
+  void build(RigOptions options) {
+    options_ = options;
+    camera_.reset();
+    projector_.reset();
+    auto made = Rig::create(options, support::tiny_responses(), &clock_);
+    ASSERT_TRUE(made) << made.error().message;
+    rig_ = *std::move(made);
+    camera_ = std::make_unique<SimCamera>(*rig_);
+    projector_ = std::make_unique<SimProjector>(*rig_);
+    ASSERT_TRUE(camera_->open());
+    ASSERT_TRUE(projector_->open());
+  }
+  void SetUp() override { build(support::tiny_rig()); }
+
+  void show(std::uint64_t id, std::uint8_t code) {
+    ASSERT_TRUE(projector_->show(support::flat_pattern(options_, id, code), {}));
+    clock_.sleep(options_.projector.latency, {});
+  }
+  Frame take(nanoseconds exposure) {
+    Result<Frame> frame = camera_->capture({exposure, 0}, {});
+    EXPECT_TRUE(frame) << frame.error().message;
+    return frame ? *std::move(frame) : Frame{};
+  }
+  Result<Frame> try_take(nanoseconds exposure = kTurn) {
+    return camera_->capture({exposure, 0}, {});
+  }
+
+  ManualClock clock_;
+  RigOptions options_;
+  std::unique_ptr<Rig> rig_;
+  std::unique_ptr<SimCamera> camera_;
+  std::unique_ptr<SimProjector> projector_;
+};
+
+/// Mean code above black of a channel over the middle of the picture.
+double middle(const Frame& frame, int channel) {
+  double sum = 0.0;
+  for (int y = 20; y < 44; ++y) {
+    for (int x = 20; x < 44; ++x) sum += frame.pixels.at(x, y, channel) - 64.0;
+  }
+  return sum / (24.0 * 24.0);
+}
+
+TEST_F(RigTest, LightGrowsInProportionToTheExposure) {
+  options_.camera.dark_electrons_per_second = 0.0;
+  build(options_);
+  show(1, 128);
+  const double one = middle(take(kTurn), 0);
+  const double four = middle(take(4 * kTurn), 0);
+  // Shot noise of the means: about 330 electrons a pixel over 576 pixels in the shorter one, four
+  // sigma.
+  const double electrons = one * 2.5 * 576.0;
+  EXPECT_NEAR(four / one, 4.0, 4.0 * 4.0 * std::sqrt(1.25 / electrons));
+}
+
+TEST_F(RigTest, ClipsWhenOverexposed) {
+  show(1, 255);
+  const Frame frame = take(8s);
+  EXPECT_EQ(frame.pixels.at(32, 32, 0), 4095);
+}
+
+TEST_F(RigTest, ExposuresOfPartOfATurnAreWrongByTheWheel) {
+  show(1, 255);
+  const Frame whole = take(kTurn);
+  const Frame part = take(kTurn / 3);
+  double worst = 0.0;
+  for (int c = 0; c < 3; ++c) {
+    worst = std::max(worst, std::abs(3.0 * middle(part, c) / middle(whole, c) - 1.0));
+  }
+  EXPECT_GT(worst, 0.3);
+}
+
+TEST_F(RigTest, TheSameRequestGivesTheSamePixelsWheneverItIsMade) {
+  show(3, 200);
+  const Frame first = take(2 * kTurn);
+  show(4, 100);
+  take(kTurn);
+  clock_.advance(17ms);
+  show(3, 200);
+  const Frame again = take(2 * kTurn);
+  EXPECT_EQ(first.pixels, again.pixels);
+  EXPECT_EQ(first.exposure, again.exposure);
+  EXPECT_EQ(first.sha256, again.sha256);
+  build(options_);  // another process would see the same
+  show(3, 200);
+  EXPECT_EQ(take(2 * kTurn).sha256, first.sha256);
+}
+
+TEST_F(RigTest, NoiseDiffersBetweenSeedsPatternsAndExposures) {
+  show(3, 200);
+  const Frame frame = take(2 * kTurn);
+  EXPECT_NE(take(3 * kTurn).pixels, frame.pixels);
+  show(4, 200);
+  EXPECT_NE(take(2 * kTurn).pixels, frame.pixels);
+  options_.seed = 2;
+  build(options_);
+  show(3, 200);
+  EXPECT_NE(take(2 * kTurn).pixels, frame.pixels);
+}
+
+TEST_F(RigTest, FrameSaysWhatItIs) {
+  show(9, 255);
+  const nanoseconds before = clock_.now();
+  const Frame frame = take(kTurn);
+  EXPECT_EQ(frame.pattern_id, 9u);
+  EXPECT_EQ(frame.trigger_count, 1u);
+  EXPECT_EQ(frame.start, before);
+  EXPECT_EQ(frame.sha256, frame_hash(frame.pixels));
+  EXPECT_NE(frame.exposure, kTurn);
+  EXPECT_NEAR(static_cast<double>(frame.exposure.count()) / kTurn.count(), 1.0, 3.01e-4);
+  EXPECT_EQ(take(kTurn).trigger_count, 2u);
+}
+
+TEST_F(RigTest, AnExposureBeforeTheLightFollowsShowsTheOldPattern) {
+  show(1, 255);
+  ASSERT_TRUE(projector_->show(support::flat_pattern(options_, 2, 0), {}));
+  const Frame early = take(kTurn);  // shorter than the latency of 50 ms
+  EXPECT_EQ(early.pattern_id, 1u);
+  EXPECT_GT(middle(early, 0), 50.0);
+  const Frame across = take(kTurn);
+  EXPECT_EQ(across.pattern_id, 0u);
+  const Frame late = take(kTurn);
+  EXPECT_EQ(late.pattern_id, 2u);
+  EXPECT_LT(middle(late, 0), 5.0);
+}
+
+TEST_F(RigTest, BlackPatternStillLeaksTheProjectorsBlackLevel) {
+  options_.camera.read_noise_electrons = 0.5;
+  options_.camera.dark_electrons_per_second = 0.0;
+  options_.projector.black_level = 0.01;
+  build(options_);
+  show(1, 0);
+  const double leak = middle(take(60 * kTurn), 0);
+  show(2, 255);
+  const double full = middle(take(kTurn), 0) * 60.0;
+  EXPECT_NEAR(
+      leak / full, 0.01, 0.0005);  // 5 % : shot noise of about 33 codes over 576 pixels is 0.3 %
+  ASSERT_TRUE(projector_->dark());
+  EXPECT_NEAR(middle(take(60 * kTurn), 0), 0.0, 0.1);
+}
+
+TEST_F(RigTest, TruthSaysWhatShines) {
+  show(5, 255);
+  const auto truth = rig_->truth();
+  ASSERT_TRUE(truth);
+  EXPECT_EQ(truth->pattern_id, 5u);
+  EXPECT_EQ(truth->scene, R"({"kind":"hills"})");
+  ASSERT_EQ(truth->patch_irradiance.size(), 16u);
+  EXPECT_NEAR(truth->patch_irradiance[5][0], 1e-3, 3e-5);  // vignetting near the middle
+  EXPECT_GT(truth->surface_radiance.at(4, 4, 0), 1e-5f);
+}
+
+TEST_F(RigTest, AnEightSecondExposureTakesAsLongAsTheTimeFactorSays) {
+  auto made = Rig::create(options_, support::tiny_responses());  // factor 1000, its own clock
+  ASSERT_TRUE(made);
+  SimCamera camera(**made);
+  ASSERT_TRUE(camera.open());
+  const auto start = std::chrono::steady_clock::now();
+  const auto frame = camera.capture({8s, 0}, {});
+  const auto took = std::chrono::steady_clock::now() - start;
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_GE(took, 7990us);  // the measured exposure may be 3e-4 shorter
+  EXPECT_LT(took, 4s);      // a loaded machine
+}
+
+TEST_F(RigTest, OpeningTakesTheDeviceFromWhoeverHadIt) {
+  SimCamera other(*rig_);
+  ASSERT_TRUE(other.open());
+  const auto refused = try_take();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+  EXPECT_TRUE(other.capture({kTurn, 0}, {}));
+}
+
+TEST_F(RigTest, ResponsesThatDoNotFitAreRefused) {
+  auto responses = *support::tiny_responses();
+  responses.patches.pop_back();
+  EXPECT_FALSE(Rig::create(options_, std::make_shared<TransportResponses>(responses)));
+  responses = *support::tiny_responses();
+  responses.block.nx = 9;
+  EXPECT_FALSE(Rig::create(options_, std::make_shared<TransportResponses>(responses)));
+}
+
+class RigFaultTest : public RigTest {
+ protected:
+  void arm(FaultKind kind, int count = 1, int skip = 0) {
+    ASSERT_TRUE(rig_->arm({{kind, 0, skip, count}}));
+  }
+};
+
+TEST_F(RigFaultTest, AStaleFrameNamesTheOldPattern) {
+  show(1, 0);
+  show(2, 255);
+  arm(FaultKind::kStaleFrame);
+  const Frame stale = take(kTurn);
+  EXPECT_EQ(stale.pattern_id, 1u);
+  EXPECT_LT(middle(stale, 0), 5.0);
+  EXPECT_EQ(take(kTurn).pattern_id, 2u);
+}
+
+TEST_F(RigFaultTest, ADuplicateFrameKeepsItsTriggerCount) {
+  show(1, 0);
+  const Frame first = take(kTurn);
+  show(2, 255);
+  arm(FaultKind::kDuplicateFrame);
+  const Frame duplicate = take(kTurn);
+  EXPECT_EQ(duplicate.trigger_count, first.trigger_count);
+  EXPECT_EQ(duplicate.sha256, first.sha256);
+  EXPECT_EQ(take(kTurn).trigger_count, 2u);
+}
+
+TEST_F(RigFaultTest, ATornFrameBreaksItsHash) {
+  show(1, 255);
+  arm(FaultKind::kTornFrame);
+  const Frame torn = take(kTurn);
+  EXPECT_NE(torn.sha256, frame_hash(torn.pixels));
+  const Frame whole = take(kTurn);
+  EXPECT_EQ(whole.sha256, frame_hash(whole.pixels));
+}
+
+TEST_F(RigFaultTest, ABlackFrameHasTheRightIdAndNoLight) {
+  show(1, 255);
+  arm(FaultKind::kBlackFrame);
+  const Frame black = take(kTurn);
+  EXPECT_EQ(black.pattern_id, 1u);
+  EXPECT_LT(middle(black, 0), 1.0);
+}
+
+TEST_F(RigFaultTest, AMissingFrameTimesOutAndIsNotCounted) {
+  show(1, 255);
+  arm(FaultKind::kMissingFrame);
+  const nanoseconds start = clock_.now();
+  const auto missing = try_take(1s);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kTimeout);
+  EXPECT_EQ(clock_.now() - start, 3500ms);
+  EXPECT_EQ(take(kTurn).trigger_count, 1u);
+}
+
+TEST_F(RigFaultTest, OtherFrameFaultsShowInTheFields) {
+  show(1, 255);
+  const Frame first = take(kTurn);
+  arm(FaultKind::kSkippedTrigger);
+  EXPECT_EQ(take(kTurn).trigger_count, 3u);
+  arm(FaultKind::kTimeBackwards);
+  EXPECT_LT(take(kTurn).start, first.start + 2 * kTurn - 1ms);
+  arm(FaultKind::kWrongExposure);
+  EXPECT_GT(take(kTurn).exposure, kTurn * 5 / 4);
+}
+
+TEST_F(RigFaultTest, FaultsWaitForTheirTurnAndEnd) {
+  show(1, 255);
+  arm(FaultKind::kTornFrame, 2, 1);
+  const auto intact = [&] {
+    const Frame frame = take(kTurn);
+    return frame.sha256 == frame_hash(frame.pixels);
+  };
+  EXPECT_TRUE(intact());
+  EXPECT_FALSE(intact());
+  EXPECT_FALSE(intact());
+  EXPECT_TRUE(intact());
+}
+
+TEST_F(RigFaultTest, AFaultMayWaitForAPattern) {
+  ASSERT_TRUE(rig_->arm({{.kind = FaultKind::kBlackFrame, .pattern = 2}}));
+  show(1, 255);
+  EXPECT_GT(middle(take(kTurn), 0), 50.0);
+  show(2, 255);
+  EXPECT_LT(middle(take(kTurn), 0), 1.0);
+}
+
+TEST_F(RigFaultTest, ALostCameraComesBackAfterAWhile) {
+  arm(FaultKind::kCameraLost, 2);
+  EXPECT_EQ(try_take().error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(try_take().error().code, ErrorCode::kUnavailable);  // closed
+  EXPECT_EQ(camera_->open().error().code, ErrorCode::kUnavailable);
+  ASSERT_TRUE(camera_->open());
+  EXPECT_TRUE(try_take());
+}
+
+TEST_F(RigFaultTest, ALostProjectorComesBackAfterAWhile) {
+  arm(FaultKind::kProjectorLost, 2);
+  const drivers::Pattern pattern = support::flat_pattern(options_, 1, 255);
+  EXPECT_EQ(projector_->show(pattern, {}).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(projector_->open().error().code, ErrorCode::kUnavailable);
+  ASSERT_TRUE(projector_->open());
+  EXPECT_TRUE(projector_->show(pattern, {}));
+}
+
+TEST_F(RigFaultTest, AStuckPatternAndASlowProjectorShowInTheId) {
+  show(1, 255);
+  arm(FaultKind::kPatternStuck);
+  show(2, 255);
+  EXPECT_EQ(take(kTurn).pattern_id, 1u);
+  arm(FaultKind::kSlowProjector);
+  show(3, 255);
+  EXPECT_EQ(take(kTurn).pattern_id, 1u);
+  clock_.advance(1s);
+  EXPECT_EQ(take(kTurn).pattern_id, 3u);
+}
+
+TEST_F(RigFaultTest, AStuckLampStaysOnOnce) {
+  show(1, 255);
+  arm(FaultKind::kLampStuck);
+  ASSERT_TRUE(projector_->dark());
+  EXPECT_TRUE(rig_->status()->lamp_on);
+  ASSERT_TRUE(projector_->dark());
+  EXPECT_FALSE(rig_->status()->lamp_on);
+}
+
+TEST(FaultNames, GoThereAndBack) {
+  for (const FaultName& fault : fault_names()) {
+    EXPECT_EQ(to_string(fault.kind), fault.name);
+    EXPECT_EQ(fault_from_name(fault.name).value(), fault.kind);
+  }
+  const auto unknown = fault_from_name("gremlin");
+  ASSERT_FALSE(unknown);
+  EXPECT_THAT(unknown.error().message, ::testing::HasSubstr("stale_frame"));
+}
+
+}  // namespace
+}  // namespace opaline::sim
