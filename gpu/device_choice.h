@@ -27,7 +27,7 @@ struct DeviceInfo {
 
 /// What a program needs of a device.
 struct DeviceWish {
-  std::string name;            ///< part of the device's name; empty: any
+  std::string name{};          ///< part of the device's name; empty: any
   bool allow_software = true;  ///< a CPU implementation such as Mesa's lavapipe will do
   bool graphics = false;       ///< draws triangles, not only compute
 };
