@@ -1,0 +1,285 @@
+#include "config/rig_config.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+
+namespace opaline::config {
+namespace {
+
+constexpr std::array<std::string_view, 3> kResponseNames{"linear", "gamma", "table"};
+constexpr Range kAtLeast0 = Range{.min = 0.0};
+constexpr Range kAbove0 = Range{.min = 0.0, .min_excluded = true};
+constexpr Range kPictureSize = Range{.min = 1, .max = 8192};
+constexpr Range kGamma = Range{.min = 0.1, .max = 10.0};
+constexpr Range kSeed = Range{.min = 0};
+
+bool is_rotation(const std::array<double, 9>& r) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      double product = 0.0;
+      for (int k = 0; k < 3; ++k) product += r[3 * i + k] * r[3 * j + k];
+      if (std::abs(product - (i == j ? 1.0 : 0.0)) > 1e-6) return false;
+    }
+  }
+  const Vec3 normal = cross({r[0], r[1], r[2]}, {r[3], r[4], r[5]});
+  return dot(normal, {r[6], r[7], r[8]}) > 0.0;
+}
+
+void visit_pose(Fields& fields, Pose& pose) {
+  fields.numbers({"rotation", "of the sample's frame into the camera's, 3 x 3, row by row"},
+                 pose.rotation,
+                 Range::between(-1.001, 1.001));
+  fields.check(is_rotation(pose.rotation), "rotation", "expected an orthonormal matrix, det +1");
+  std::array<double, 3> t{pose.translation.x, pose.translation.y, pose.translation.z};
+  fields.numbers({"translation", "of the same: p_camera = rotation p_sample + translation"},
+                 t,
+                 {},
+                 Unit::kLength);
+  pose.translation = {t[0], t[1], t[2]};
+}
+
+void visit_camera_model(Fields& fields, CameraModel& model, bool required) {
+  fields.whole({"width", "of the picture, pixels", required}, model.width, kPictureSize);
+  fields.whole({"height", "of the picture, pixels", required}, model.height, kPictureSize);
+  fields.number({"fx", "focal length, pixels", required}, model.fx, kAbove0);
+  fields.number({"fy", "focal length, pixels", required}, model.fy, kAbove0);
+  fields.number({"cx", "principal point, pixels from the left edge", required}, model.cx);
+  fields.number({"cy", "principal point, pixels from the top edge", required}, model.cy);
+  fields.numbers({"distortion", "k1 k2 p1 p2 k3 (Brown; OpenCV's order)"}, model.distortion);
+  visit_pose(fields, model.camera_from_sample);
+}
+
+void visit_projector_size(Fields& fields, int& width, int& height) {
+  fields.whole({"width", "of the picture, pixels"}, width, kPictureSize);
+  fields.whole({"height", "of the picture, pixels"}, height, kPictureSize);
+}
+
+/// What the simulated projector and its calibration both have.
+template <class Projector>
+void visit_projection(Fields& fields, Projector& p) {
+  visit_projector_size(fields, p.width, p.height);
+  fields.number({"mm_per_pixel", "of the picture on the lit face"}, p.mm_per_pixel, kAbove0);
+  fields.number({"offset_x_px", "pixel at which the lit face's first column begins"},
+                p.offset_x_px);
+  fields.number({"offset_y_px", "pixel at which its first row begins"}, p.offset_y_px);
+  fields.number({"gamma", "light = (code / 255)^gamma"}, p.gamma, kGamma);
+  fields.number(
+      {"black_level", "light at code 0, share of the peak"}, p.black_level, Range::between(0, 1));
+  fields.numbers({"peak_irradiance_w_per_mm2", "red, green, blue, at code 255 in the middle"},
+                 p.peak_irradiance,
+                 kAbove0);
+}
+
+constexpr Key kVignetting{"vignetting",
+                          "1 + v0 r^2 + v1 r^4 + v2 r^6, r = 1 in the picture's corners"};
+
+/// Vignetting at r = 1.
+double corner(const std::array<double, 3>& v) { return 1.0 + v[0] + v[1] + v[2]; }
+
+void visit_sim_camera(Fields& fields, sim::CameraOptics& c) {
+  visit_camera_model(fields, c.model, false);
+  fields.number({"psf_sigma_px", "Gaussian blur; 0: none"}, c.psf_sigma_px, Range::between(0, 20));
+  fields.numbers(kVignetting, c.vignetting);
+  fields.check(corner(c.vignetting) > 0.0, "vignetting", "expected light in the corners");
+  fields.numbers(
+      {"sensitivity", "red, green, blue: electrons per (W/(mm^2 sr) s)"}, c.sensitivity, kAbove0);
+  fields.number({"full_well_electrons", "where a pixel clips"}, c.full_well_electrons, kAbove0);
+  fields.number({"gain_electrons_per_code", ""}, c.gain_electrons_per_code, kAbove0);
+  fields.number({"read_noise_electrons", "standard deviation"}, c.read_noise_electrons, kAtLeast0);
+  fields.number({"dark_electrons_per_second", ""}, c.dark_electrons_per_second, kAtLeast0);
+  fields.number(
+      {"hot_pixel_fraction", "of all pixels"}, c.hot_pixel_fraction, Range::between(0, 1));
+  fields.number(
+      {"hot_pixel_electrons_per_second", ""}, c.hot_pixel_electrons_per_second, kAtLeast0);
+  fields.number({"response_gamma", "code = signal^(1/gamma); 1: linear"}, c.response_gamma, kGamma);
+  fields.number({"black_level", "code without light"}, c.black_level, kAtLeast0);
+  fields.whole({"bit_depth", ""}, c.bit_depth, Range::between(8, 16));
+  fields.check(
+      c.black_level <= 0.5 * c.max_code(), "black_level", "expected at most half the codes");
+  fields.number(
+      {"exposure_error", "relative, of the shutter"}, c.exposure_error, Range::between(0, 0.1));
+  fields.duration({"shortest_exposure", ""}, c.shortest_exposure);
+  fields.duration({"longest_exposure", ""},
+                  c.longest_exposure,
+                  Range{.min = 0, .max = 3600, .min_excluded = true});
+  fields.check(c.longest_exposure >= c.shortest_exposure,
+               "longest_exposure",
+               "expected at least shortest_exposure");
+}
+
+void visit_sim_projector(Fields& fields, sim::ProjectorOptics& p) {
+  visit_projection(fields, p);
+  fields.numbers(kVignetting, p.vignetting);
+  fields.check(corner(p.vignetting) > 0.0, "vignetting", "expected light in the corners");
+  fields.duration({"latency", "from the picture to its light"}, p.latency, Range::between(0, 1));
+  fields.duration({"wheel_turn", "of the colour wheel: exposures are whole multiples"},
+                  p.wheel_turn,
+                  Range::between(1e-6, 1));
+}
+
+void visit_path(Fields& fields, const Key& key, std::filesystem::path& path, bool must_exist) {
+  fields.path(key, path);
+  std::error_code ignored;
+  fields.check(!must_exist || path.empty() || std::filesystem::exists(path, ignored),
+               key.name,
+               fmt::format("there is no {}", path.string()));
+}
+
+void visit_transport(Fields& fields, SimConfig& sim, bool check_files) {
+  visit_path(
+      fields,
+      {"responses", "stored light transport of this scene; none: computed (tens of minutes)"},
+      sim.responses,
+      check_files);
+  fields.path({"cache", "directory for computed ones; empty: the user's cache"}, sim.cache);
+}
+
+void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
+  fields.one_of({"run", "where the simulated station lives"}, sim.run, kRigPlaceNames);
+  fields.path({"socket", "of opaline-rig when run = \"process\"; empty: by the station's name"},
+              sim.socket);
+  fields.whole({"seed", "of all its noise"}, sim.rig.seed, kSeed);
+  fields.number({"time_factor", "how many times as fast as real time its clock runs"},
+                sim.rig.time_factor,
+                Range::between(1, 1000));
+  fields.table({"camera", "What its camera does to the light."},
+               [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });
+  fields.table({"projector", "What its projector does with a picture."},
+               [&](Fields& f) { visit_sim_projector(f, sim.rig.projector); });
+  fields.table({"transport", "How light travels in the sample (Monte Carlo)."},
+               [&](Fields& f) { visit_transport(f, sim, check_files); });
+}
+
+/// A simulated station knows itself.
+capture::StationCalibration truth_of(const sim::RigOptions& rig) {
+  capture::StationCalibration calibration;
+  capture::CameraCalibration& camera = calibration.camera;
+  camera.model = rig.camera.model;
+  camera.bit_depth = rig.camera.bit_depth;
+  if (rig.camera.response_gamma != 1.0) camera.response.kind = capture::ResponseCurve::Kind::kGamma;
+  camera.response.gamma = rig.camera.response_gamma;
+  camera.black_level = rig.camera.black_level;
+  camera.gain_electrons_per_code = rig.camera.gain_electrons_per_code;
+  camera.read_noise_electrons = rig.camera.read_noise_electrons;
+  camera.vignetting.coefficients = rig.camera.vignetting;
+  camera.sensitivity = rig.camera.sensitivity;
+  capture::ProjectorCalibration& projector = calibration.projector;
+  projector.width = rig.projector.width;
+  projector.height = rig.projector.height;
+  projector.mm_per_pixel = rig.projector.mm_per_pixel;
+  projector.offset_x_px = rig.projector.offset_x_px;
+  projector.offset_y_px = rig.projector.offset_y_px;
+  projector.gamma = rig.projector.gamma;
+  projector.black_level = rig.projector.black_level;
+  projector.vignetting.coefficients = rig.projector.vignetting;
+  projector.peak_irradiance = rig.projector.peak_irradiance;
+  return calibration;
+}
+
+void visit_response(Fields& fields, capture::ResponseCurve& response) {
+  fields.one_of({"response", "how codes follow the light"}, response.kind, kResponseNames);
+  fields.number({"response_gamma", "code = signal^(1/gamma), when response = \"gamma\""},
+                response.gamma,
+                kGamma);
+  fields.quantities({"response_table", "signal at equally spaced codes, 0 to 1, when \"table\""},
+                    response.table,
+                    0,
+                    Unit::kPlain,
+                    Range::between(0, 1));
+  const std::vector<double>& t = response.table;
+  bool rises = t.size() >= 2 && t.front() == 0.0 && t.back() == 1.0;
+  for (std::size_t i = 1; rises && i < t.size(); ++i) rises = t[i] > t[i - 1];
+  fields.check(response.kind != capture::ResponseCurve::Kind::kTable || rises,
+               "response_table",
+               "expected values that rise from 0 to 1");
+}
+
+void visit_hot_pixels(Fields& fields, std::vector<std::pair<int, int>>& pixels) {
+  std::vector<std::int64_t> flat;
+  for (const auto& [x, y] : pixels) flat.insert(flat.end(), {x, y});
+  fields.integers(
+      {"hot_pixels", "known ones, x, y, x, y, ...; others are found"}, flat, 0, kPictureSize);
+  fields.check(flat.size() % 2 == 0, "hot_pixels", "expected pairs x, y");
+  pixels.clear();
+  for (std::size_t i = 0; i + 1 < flat.size(); i += 2) {
+    pixels.emplace_back(static_cast<int>(flat[i]), static_cast<int>(flat[i + 1]));
+  }
+}
+
+void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool required) {
+  visit_camera_model(fields, c.model, required);
+  fields.whole({"bit_depth", ""}, c.bit_depth, Range::between(8, 16));
+  visit_response(fields, c.response);
+  fields.number({"black_level", "code without light"}, c.black_level, kAtLeast0);
+  fields.check(c.black_level < c.max_code(), "black_level", "expected less than the highest code");
+  fields.number({"gain_electrons_per_code", ""}, c.gain_electrons_per_code, kAbove0);
+  fields.number({"read_noise_electrons", "standard deviation"}, c.read_noise_electrons, kAtLeast0);
+  fields.numbers(kVignetting, c.vignetting.coefficients);
+  fields.check(
+      corner(c.vignetting.coefficients) > 0.0, "vignetting", "expected light in the corners");
+  fields.numbers(
+      {"sensitivity", "red, green, blue: electrons per (W/(mm^2 sr) s)"}, c.sensitivity, kAbove0);
+  visit_hot_pixels(fields, c.hot_pixels);
+}
+
+void visit_calibration(Fields& fields, RigConfig& rig) {
+  const bool required = rig.camera != Driver::kSim;
+  fields.table({"camera", "The camera."},
+               [&](Fields& f) { visit_calibrated_camera(f, rig.calibration.camera, required); });
+  fields.table({"projector", "The projector; its light falls perpendicular on the lit face."},
+               [&](Fields& f) {
+                 capture::ProjectorCalibration& p = rig.calibration.projector;
+                 visit_projection(f, p);
+                 f.numbers(kVignetting, p.vignetting.coefficients);
+                 f.check(corner(p.vignetting.coefficients) > 0.0,
+                         "vignetting",
+                         "expected light in the corners");
+               });
+}
+
+}  // namespace
+
+void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
+  fields.table({"station", "The station."}, [&](Fields& f) {
+    f.text({"name", "two jobs on one station exclude each other"}, rig.station);
+    f.check(!rig.station.empty() && rig.station.find('/') == std::string::npos,
+            "name",
+            "expected a name without \"/\"");
+  });
+  fields.table({"camera", "Which camera."}, [&](Fields& f) {
+    f.one_of({"driver", "its back end"}, rig.camera, kDriverNames);
+  });
+  fields.table({"projector", "Which projector."}, [&](Fields& f) {
+    f.one_of({"driver", "its back end"}, rig.projector, kDriverNames);
+  });
+  fields.table({"replay", "Photographs instead of devices."}, [&](Fields& f) {
+    const bool used = rig.camera == Driver::kReplay || rig.projector == Driver::kReplay;
+    visit_path(f,
+               {"folder", "with its index, used by driver = \"replay\"", used},
+               rig.replay_folder,
+               check_files);
+  });
+  fields.table({"sim", "The simulated station, used by driver = \"sim\"."},
+               [&](Fields& f) { visit_sim(f, rig.sim, check_files); });
+  if (fields.is_reading()) rig.calibration = truth_of(rig.sim.rig);
+  fields.table({"calibration",
+                "What is known about the devices; of a simulated station the truth, unless given."},
+               [&](Fields& f) { visit_calibration(f, rig); });
+}
+
+std::filesystem::path rig_socket(const RigConfig& rig) {
+  if (!rig.sim.socket.empty()) return rig.sim.socket;
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::filesystem::path directory =
+      runtime != nullptr && *runtime != '\0'
+          ? std::filesystem::path(runtime) / "opaline"
+          : std::filesystem::path(fmt::format("/tmp/opaline-{}", ::getuid()));
+  return directory / fmt::format("rig-{}.sock", rig.station);
+}
+
+}  // namespace opaline::config

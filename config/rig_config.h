@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "base/block.h"
+#include "capture/calibration.h"
+#include "config/fields.h"
+#include "sim/rig_options.h"
+
+namespace opaline::config {
+
+/// Which back end of a device interface is used.
+enum class Driver : std::uint8_t {
+  kSim,     ///< the simulated station
+  kReplay,  ///< a folder of photographs
+};
+inline constexpr std::array<std::string_view, 2> kDriverNames{"sim", "replay"};
+
+/// Where the simulated station runs.
+enum class RigPlace : std::uint8_t {
+  kInside,   ///< in the capture's own process
+  kProcess,  ///< as opaline-rig, which outlives whoever drives it, as hardware does
+};
+inline constexpr std::array<std::string_view, 2> kRigPlaceNames{"inside", "process"};
+
+/// The simulated station: its sample, how light travels in it, and its devices.
+struct SimConfig {
+  RigPlace run = RigPlace::kInside;
+  std::filesystem::path socket;  ///< of opaline-rig; empty: see rig_socket()
+  sim::RigOptions rig;
+  std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
+  std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
+};
+
+/// A rig file: the devices of a station, and what is known about them.
+struct RigConfig {
+  std::string station = "demo";  ///< two jobs on one station exclude each other
+  Driver camera = Driver::kSim;
+  Driver projector = Driver::kSim;
+  std::filesystem::path replay_folder;  ///< photographs and their index
+  SimConfig sim;
+  /// What the capture believes of the devices. On a simulated station the truth, unless given.
+  capture::StationCalibration calibration;
+
+  bool is_simulated() const { return camera == Driver::kSim || projector == Driver::kSim; }
+};
+
+/// Visits every key of a rig file. `check_files`: files it names must exist.
+void visit_rig(Fields& fields, RigConfig& rig, bool check_files);
+
+/// The socket of the station's opaline-rig: as configured, or rig-STATION.sock in
+/// $XDG_RUNTIME_DIR/opaline, or without that in /tmp/opaline-UID.
+std::filesystem::path rig_socket(const RigConfig& rig);
+
+}  // namespace opaline::config

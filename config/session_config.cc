@@ -1,0 +1,295 @@
+#include "config/session_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/ensure.h"
+#include "base/files.h"
+#include "config/block_fields.h"
+
+namespace opaline::config {
+namespace {
+
+namespace fs = std::filesystem;
+using reconstruct::InverseOptions;
+
+constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
+constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
+constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
+
+void visit_sample(Fields& fields, SessionConfig& session) {
+  capture::SampleGeometry& sample = session.sample;
+  fields.text({"name", "what it is"}, session.sample_name);
+  visit_block(fields, sample.block);
+  fields.number({"ior", "relative refractive index"}, sample.ior, Range::between(1, 3));
+  visit_face(fields, {"lit_face", "where the projector's light enters"}, sample.lit_face);
+  visit_face(fields, {"seen_face", "what the camera looks at"}, sample.seen_face);
+}
+
+void visit_exposures(Fields& fields, capture::ExposureOptions& e) {
+  fields.duration({"shortest", "is rounded to whole turns of the colour wheel"}, e.shortest);
+  fields.duration({"longest", ""}, e.longest);
+  fields.check(e.longest >= e.shortest, "longest", "expected at least shortest");
+  fields.number({"ratio", "each exposure over the one before"},
+                e.ratio,
+                Range{.min = 1.0, .max = 16.0, .min_excluded = true});
+  fields.number({"wanted_snr", "of a dark pixel on the sample; longer exposures until it is met"},
+                e.wanted_snr,
+                Range::above(0));
+  fields.number(
+      {"dark_quantile", "which pixel counts as dark"}, e.dark_quantile, Range::between(0, 0.5));
+}
+
+void visit_capture(Fields& fields, capture::CaptureOptions& c) {
+  fields.whole({"regions", "n: the lit face is lit in n x n regions"},
+               c.patterns.regions,
+               Range::between(1, 32));
+  fields.whole({"held_out_lights", "kept from the fit: shifted by half a region, larger, smaller"},
+               c.patterns.held_out_lights,
+               Range::between(0, 8));
+  fields.whole({"retries", "of a region after a bad frame"}, c.retries, Range::between(0, 100));
+  fields.whole({"settle_periods", "projector frames to wait on top of its latency"},
+               c.settle_periods,
+               Range::between(0, 1000));
+  fields.number({"min_coverage", "share of a surface cell that usable pixels must see"},
+                c.min_coverage,
+                Range{.min = 0.0, .max = 1.0, .min_excluded = true});
+  fields.length_mm({"direct_light_margin", "masked around a lit region on the seen face"},
+                   c.direct_light_margin_mm,
+                   Range::at_least(0));
+  fields.number({"usable_share", "of the regions; fewer usable ones end the session"},
+                c.usable_share,
+                Range::between(0, 1));
+  fields.table({"exposures", "Exposures the bracket is chosen from."},
+               [&](Fields& f) { visit_exposures(f, c.exposures); });
+}
+
+void visit_bounds(Fields& fields, reconstruct::CoefficientBounds& bounds) {
+  fields.number({"lowest_per_mm", ""}, bounds.lowest, Range::above(0));
+  fields.number({"highest_per_mm", ""}, bounds.highest, Range::above(0));
+  fields.check(
+      bounds.highest > bounds.lowest, "highest_per_mm", "expected more than lowest_per_mm");
+}
+
+void visit_reconstruction(Fields& fields, InverseOptions& r) {
+  fields.one_of({"source", "how light enters"}, r.source, kSourceNames);
+  fields.one_of({"deposit", "where a cell's share of the collimated source is put"},
+                r.deposit,
+                kDepositNames);
+  fields.one_of({"boundary", "condition at the surface"}, r.boundary, kBoundaryNames);
+  fields.number({"model_error", "relative, of the diffusion model itself"},
+                r.model_error,
+                Range::at_least(0));
+  fields.number(
+      {"regularization", "weight of smoothness; 0: none"}, r.regularization, Range::at_least(0));
+  fields.whole({"max_iterations", "of L-BFGS, per channel; 0: the homogeneous fit"},
+               r.max_iterations,
+               Range::between(0, 100000));
+  fields.number({"tolerance", "of every diffusion solve, relative residual"},
+                r.tolerance,
+                Range{.min = 0.0, .max = 0.1, .min_excluded = true});
+  fields.number({"discrepancy", "stop at chi^2 <= this times the number of data; 0: never"},
+                r.discrepancy,
+                Range::at_least(0));
+  fields.number({"stalled", "stop when ten iterations gain less than this fraction"},
+                r.stalled,
+                Range::at_least(0));
+  fields.whole({"checkpoint_every", "iterations"}, r.checkpoint_every, Range::between(1, 100000));
+  fields.one_of({"back_end", "what computes"}, r.back_end, kBackEndNames);
+  fields.whole({"threads", "0: one a core"}, r.threads, Range::between(0, 1024));
+  fields.table({"absorption", "Bounds of sigma_a."},
+               [&](Fields& f) { visit_bounds(f, r.absorption); });
+  fields.table({"reduced_scattering", "Bounds of sigma_s'."},
+               [&](Fields& f) { visit_bounds(f, r.reduced_scattering); });
+}
+
+void visit_preview(Fields& fields, PreviewOptions& p) {
+  fields.whole({"samples_per_axis", "of each pixel"}, p.samples_per_axis, Range::between(1, 8));
+  fields.number({"white_quantile", "of the captured picture: what is shown as white"},
+                p.white_quantile,
+                Range::between(0.5, 1));
+  fields.number({"tolerance", "of the light's solution in the material, relative residual"},
+                p.tolerance,
+                Range{.min = 0.0, .max = 0.1, .min_excluded = true});
+}
+
+/// `rig_is_known`: session.rig has been read, and the two files must agree.
+void visit_session(Fields& fields, SessionConfig& session, bool /*rig_is_known*/) {
+  fields.text({"name", "of the session, for people"}, session.name);
+  std::string rig_file = session.rig_file.string();
+  fields.text({"rig", "the rig file", true}, rig_file);
+  session.rig_file = rig_file;
+  fields.table({"sample", "What is measured."}, [&](Fields& f) {
+    visit_sample(f, session);
+  });
+  fields.table({"capture", "How it is captured."},
+               [&](Fields& f) { visit_capture(f, session.capture); });
+  fields.table({"reconstruction", "How the material is found."},
+               [&](Fields& f) { visit_reconstruction(f, session.reconstruction); });
+  fields.table({"preview", "How the report's pictures are made."},
+               [&](Fields& f) { visit_preview(f, session.preview); });
+}
+
+/// Both files, and all that is wrong with them.
+struct Loaded {
+  SessionConfig session;
+  std::vector<Problem> problems;
+};
+
+Result<SessionConfig> accept(Loaded loaded) {
+  if (!loaded.problems.empty()) return invalid_argument(to_string(loaded.problems));
+  return std::move(loaded.session);
+}
+
+/// Reads the rig before the session, so that the session's own visit can compare.
+Loaded read_both(const Source& session, const Source& rig, bool check_files) {
+  Loaded loaded;
+  loaded.problems =
+      read_toml(rig, [&](Fields& f) { visit_rig(f, loaded.session.rig, check_files); });
+  const bool rig_is_good = loaded.problems.empty();
+  const auto own =
+      read_toml(session, [&](Fields& f) { visit_session(f, loaded.session, rig_is_good); });
+  loaded.problems.insert(loaded.problems.begin(), own.begin(), own.end());
+  return loaded;
+}
+
+Result<Source> read_source(const fs::path& file) {
+  auto text = read_text(file, 1u << 20);
+  if (!text) return text.error();
+  std::error_code failed;
+  const fs::path absolute = fs::absolute(file, failed);
+  return Source{file.string(), *std::move(text), absolute.parent_path()};
+}
+
+/// The rig file that a session names, without looking at anything else.
+struct RigReference {
+  fs::path file;
+  std::vector<Problem> problems;
+};
+
+RigReference rig_reference(const Source& session, const Error* missing) {
+  RigReference reference;
+  reference.problems = read_toml(session, [&](Fields& f) {
+    SessionConfig ignored;
+    visit_session(f, ignored, false);
+    reference.file = ignored.rig_file;
+    if (missing != nullptr) {
+      f.check(false, "rig", fmt::format("{}; expected a rig file", missing->message));
+    }
+  });
+  return reference;
+}
+
+Result<Loaded> load_both(const fs::path& session_file) {
+  const auto session = read_source(session_file);
+  if (!session) return session.error();
+  const RigReference reference = rig_reference(*session, nullptr);
+  if (reference.file.empty()) return Loaded{{}, reference.problems};
+  const fs::path rig_file = (session->directory / reference.file).lexically_normal();
+  const auto rig = read_source(rig_file);
+  if (!rig) return Loaded{{}, rig_reference(*session, &rig.error()).problems};
+  Loaded loaded = read_both(*session, *rig, true);
+  loaded.session.rig_file = rig_file;
+  return loaded;
+}
+
+/// By its tables: what has nothing of a rig is taken for a session.
+bool is_rig_file(const Source& source) {
+  const auto keys = top_level_keys(source);
+  return std::any_of(keys.begin(), keys.end(), [](const std::string& key) {
+    return key == "station" || key == "camera" || key == "projector" || key == "sim" ||
+           key == "calibration" || key == "replay";
+  });
+}
+
+}  // namespace
+
+Result<SessionConfig> parse_session(const Source& session, const Source& rig) {
+  return accept(read_both(session, rig, false));
+}
+
+Result<SessionConfig> load_session(const fs::path& session_file) {
+  auto loaded = load_both(session_file);
+  if (!loaded) return loaded.error();
+  return accept(*std::move(loaded));
+}
+
+Result<RigConfig> load_rig(const fs::path& rig_file) {
+  const auto source = read_source(rig_file);
+  if (!source) return source.error();
+  RigConfig rig;
+  const auto problems = read_toml(*source, [&](Fields& f) { visit_rig(f, rig, true); });
+  if (!problems.empty()) return invalid_argument(to_string(problems));
+  return rig;
+}
+
+Result<std::vector<Problem>> check(const fs::path& file) {
+  const auto source = read_source(file);
+  if (!source) return source.error();
+  if (is_rig_file(*source)) {
+    RigConfig rig;
+    return read_toml(*source, [&](Fields& f) { visit_rig(f, rig, true); });
+  }
+  auto loaded = load_both(file);
+  if (!loaded) return loaded.error();
+  return loaded->problems;
+}
+
+namespace {
+
+void visit_resolved(Fields& fields, SessionConfig& session) {
+  fields.table({"session", ""}, [&](Fields& f) { visit_session(f, session, false); });
+  fields.table({"rig", ""}, [&](Fields& f) { visit_rig(f, session.rig, false); });
+}
+
+}  // namespace
+
+std::string to_toml(const SessionConfig& session) {
+  SessionConfig copy = session;
+  return write_toml([&](Fields& f) { visit_resolved(f, copy); }, false);
+}
+
+Result<SessionConfig> parse_resolved(const Source& resolved) {
+  SessionConfig session;
+  const auto problems = read_toml(resolved, [&](Fields& f) { visit_resolved(f, session); });
+  if (!problems.empty()) return invalid_argument(to_string(problems));
+  return session;
+}
+
+Result<SessionConfig> load_resolved(const SessionDirectory& session) {
+  const auto source = read_source(session.resolved_toml());
+  if (!source) return source.error();
+  return parse_resolved(*source);
+}
+
+Result<SessionDirectory::Contents> read_contents(const fs::path& session_file) {
+  const auto session = load_session(session_file);
+  if (!session) return session.error();
+  auto session_text = read_text(session_file);
+  if (!session_text) return session_text.error();
+  auto rig_text = read_text(session->rig_file);
+  if (!rig_text) return rig_text.error();
+  return SessionDirectory::Contents{
+      session->name, *std::move(session_text), *std::move(rig_text), to_toml(*session)};
+}
+
+std::string session_example() {
+  SessionConfig session;
+  session.rig_file = "rig.example.toml";
+  return "# Every key of a session file, with its default. Copy what you change.\n" +
+         write_toml([&](Fields& f) { visit_session(f, session, false); }, true);
+}
+
+std::string rig_example() {
+  RigConfig rig;
+  const auto none = read_toml({}, [&](Fields& f) { visit_rig(f, rig, false); });
+  ENSURE(none.empty());  // an empty rig file is the simulated rig
+  return "# Every key of a rig file, with its default. Copy what you change.\n" +
+         write_toml([&](Fields& f) { visit_rig(f, rig, false); }, true);
+}
+
+}  // namespace opaline::config

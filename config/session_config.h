@@ -1,0 +1,65 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "base/session_directory.h"
+#include "capture/capture_options.h"
+#include "config/rig_config.h"
+#include "config/toml.h"
+#include "reconstruct/inverse_options.h"
+
+namespace opaline::config {
+
+/// How the pictures of the report are made.
+struct PreviewOptions {
+  int samples_per_axis = 2;       ///< of each pixel: 2 takes 4 samples a pixel; 1 to 8
+  double white_quantile = 0.995;  ///< of the captured picture: what is shown as white; 0.5 to 1
+  double tolerance = 1e-6;        ///< of the light's solution in the material; > 0
+};
+
+/// A session file with its rig file: all that a session is made from.
+struct SessionConfig {
+  std::string name = "session";  ///< for people
+  std::filesystem::path rig_file;
+  RigConfig rig;
+  std::string sample_name = "sample";
+  capture::SampleGeometry sample;
+  capture::CaptureOptions capture;
+  reconstruct::InverseOptions reconstruction;
+  PreviewOptions preview;
+};
+
+/// Reads a session file and the rig file it names.
+/// Errors: kNotFound when the session file is missing; kInvalidArgument with every problem of both
+/// files, one a line: FILE:LINE:COLUMN: what is wrong, and what would be right.
+Result<SessionConfig> load_session(const std::filesystem::path& session_file);
+
+/// The same from texts. A relative path in a source without a directory is a problem.
+Result<SessionConfig> parse_session(const Source& session, const Source& rig);
+
+/// The rig file alone.
+Result<RigConfig> load_rig(const std::filesystem::path& rig_file);
+
+/// Every problem of a file, whether it is a session (then its rig file's, too) or a rig file.
+/// Errors: kNotFound, kUnavailable when the file cannot be read.
+Result<std::vector<Problem>> check(const std::filesystem::path& file);
+
+/// resolved.toml: every key with its value, in the tables [session] and [rig], paths absolute.
+std::string to_toml(const SessionConfig& session);
+Result<SessionConfig> parse_resolved(const Source& resolved);
+/// From a session directory's resolved.toml.
+Result<SessionConfig> load_resolved(const SessionDirectory& session);
+
+/// What a session directory is made from, read from a session file and its rig file.
+Result<SessionDirectory::Contents> read_contents(const std::filesystem::path& session_file);
+
+/// The explained files with every key and its default: config/session.example.toml and
+/// config/rig.example.toml.
+std::string session_example();
+std::string rig_example();
+
+}  // namespace opaline::config

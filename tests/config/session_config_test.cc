@@ -1,0 +1,178 @@
+#include "config/session_config.h"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+#include "tests/support/temporary_directory.h"
+
+namespace opaline::config {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+fs::path config_file(const char* name) {
+  return fs::path(std::getenv("OPALINE_SOURCE_DIR")) / "config" / name;
+}
+
+class SessionConfigTest : public ::testing::Test {
+ protected:
+  fs::path write(const char* name, std::string_view text) {
+    const fs::path path = directory_.path() / name;
+    EXPECT_TRUE(write_whole(system_files(), path, text));
+    return path;
+  }
+  /// Line, column and message of every problem, without the file.
+  static std::vector<std::string> problems_of(const fs::path& path) {
+    const auto problems = check(path);
+    EXPECT_TRUE(problems) << problems.error().message;
+    std::vector<std::string> lines;
+    for (const Problem& p : *problems) {
+      lines.push_back(std::to_string(p.line) + ":" + std::to_string(p.column) + ": " + p.message);
+    }
+    return lines;
+  }
+  testing::TemporaryDirectory directory_;
+};
+
+TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
+  for (const char* name :
+       {"sim.toml", "sim-rig.toml", "session.example.toml", "rig.example.toml"}) {
+    const auto problems = check(config_file(name));
+    ASSERT_TRUE(problems) << problems.error().message;
+    EXPECT_THAT(*problems, IsEmpty()) << to_string(*problems);
+  }
+}
+
+TEST_F(SessionConfigTest, ShowsEveryKeyInTheExamplesAsTheProgramExplainsIt) {
+  EXPECT_EQ(read_text(config_file("session.example.toml")).value(), session_example());
+  EXPECT_EQ(read_text(config_file("rig.example.toml")).value(), rig_example());
+}
+
+TEST_F(SessionConfigTest, TakesTheDefaultsWhereAFileSaysNothing) {
+  write("rig.toml", "");
+  const auto session = load_session(write("session.toml", "rig = \"rig.toml\"\n"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->capture.patterns.regions, capture::CaptureOptions{}.patterns.regions);
+  EXPECT_EQ(session->sample.block, capture::SampleGeometry{}.block);
+  EXPECT_EQ(session->rig.sim.rig.camera.model, sim::demo_camera_model());
+}
+
+TEST_F(SessionConfigTest, ReadsItsOwnResolvedFileBackToTheSameConfiguration) {
+  const auto session = load_session(config_file("sim.toml"));
+  ASSERT_TRUE(session) << session.error().message;
+  const std::string resolved = to_toml(*session);
+  const auto again = parse_resolved({"resolved.toml", resolved, {}});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(to_toml(*again), resolved);
+  EXPECT_EQ(again->rig.calibration.camera.model, session->rig.calibration.camera.model);
+  EXPECT_EQ(again->capture.exposures.shortest, session->capture.exposures.shortest);
+  EXPECT_TRUE(again->rig_file.is_absolute());
+}
+
+TEST_F(SessionConfigTest, FindsTenMistakesInOneGoEachAtItsPlace) {
+  write("rig.toml", "[camera]\ndriver = \"webcam\"\n\n[sim.camera]\nwidth = \"256\"\n");
+  const fs::path path = write("session.toml",
+                              "name = 12\n"
+                              "rig = \"rig.toml\"\n"
+                              "retries = 3\n"
+                              "\n"
+                              "[sample]\n"
+                              "size = [\"24 mm\", \"24 mm\", \"0 mm\"]\n"
+                              "cells = [48, 48]\n"
+                              "lit_face = \"top\"\n"
+                              "[capture]\n"
+                              "region = 4\n"
+                              "[capture.exposures]\n"
+                              "  longest = \"8 mm\"\n"
+                              "ratio = 0.8\n"
+                              "[reconstuction]\n");
+  EXPECT_THAT(
+      problems_of(path),
+      ElementsAre("1:8: name is 12; expected a text in quotes",
+                  "3:1: unknown key \"retries\"; it belongs in [capture]",
+                  "6:27: size is \"0 mm\"; expected a length with its unit, such as \"24 mm\", "
+                  "more than 0 mm",
+                  "7:9: cells is a list of 2; expected a list of 3, each a whole number, 1 to 1024",
+                  StartsWith("8:12: lit_face is \"top\"; expected one of \"x_min\""),
+                  "10:1: unknown key \"region\" in [capture]; did you mean \"regions\"?",
+                  "12:13: longest is \"8 mm\"; expected a time with its unit, such as \"33 ms\" or "
+                  "\"1/30 s\", "
+                  "more than 0 s",
+                  "13:9: ratio is 0.8; expected a number, more than 1, at most 16",
+                  "14:2: unknown key \"reconstuction\"; did you mean \"reconstruction\"?",
+                  "2:10: driver is \"webcam\"; expected one of \"sim\", \"replay\"",
+                  "5:9: width is \"256\"; expected a whole number, 1 to 8192"));
+  const auto session = load_session(path);
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(session.error().message, HasSubstr("rig.toml:5:9: width"));
+}
+
+TEST_F(SessionConfigTest, NamesTheKeyThatNamesAMissingRigFileAndFindsTheOtherProblemsToo) {
+  const fs::path path = write("session.toml", "colour = 1\nrig = \"nowhere.toml\"\n");
+  EXPECT_THAT(problems_of(path),
+              ElementsAre(StartsWith("1:1: unknown key \"colour\""),
+                          AllOf(StartsWith("2:7: rig: "), HasSubstr("nowhere.toml"))));
+}
+
+TEST_F(SessionConfigTest, SaysThatTheRigIsMissing) {
+  EXPECT_THAT(problems_of(write("session.toml", "name = \"x\"\n")),
+              ElementsAre("1:1: missing key \"rig\": the rig file"));
+}
+
+TEST_F(SessionConfigTest, PointsAtASyntaxError) {
+  EXPECT_THAT(problems_of(write("session.toml", "name = \"x\"\n[capture\n")),
+              ElementsAre(StartsWith("2:9: ")));
+}
+
+TEST_F(SessionConfigTest, NamesAMissingSessionFile) {
+  const auto session = load_session(directory_.path() / "nowhere.toml");
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(session.error().message, HasSubstr("nowhere.toml"));
+}
+
+TEST_F(SessionConfigTest, MakesPathsAbsoluteAndRefusesRelativeOnesInTexts) {
+  fs::create_directory(directory_.path() / "photographs");
+  const std::string rig =
+      "camera.driver = \"replay\"\nreplay.folder = \"photographs\"\n"
+      "[calibration.camera]\nwidth = 64\nheight = 64\nfx = 600\nfy = 600\ncx = 32\ncy = 32\n";
+  const auto loaded = load_rig(write("rig.toml", rig));
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->replay_folder, directory_.path() / "photographs");
+
+  const auto session =
+      parse_session({"session.toml", "rig = \"rig.toml\"", {}}, {"rig.toml", rig, {}});
+  ASSERT_FALSE(session);
+  EXPECT_THAT(session.error().message,
+              HasSubstr("rig.toml:2:17: folder is \"photographs\"; "
+                        "expected an absolute path"));
+}
+
+TEST_F(SessionConfigTest, AsksForTheCalibrationOfACameraThatCannotKnowItself) {
+  EXPECT_THAT(
+      problems_of(write("rig.toml", "[camera]\ndriver = \"replay\"\n[replay]\nfolder = \"/\"\n")),
+      SizeIs(6));  // width, height, fx, fy, cx, cy
+}
+
+TEST_F(SessionConfigTest, MakesASessionDirectoryOfTheFilesAsGivenAndAsResolved) {
+  write("rig.toml", "# mine\n");
+  const auto contents = read_contents(write("session.toml", "rig = \"rig.toml\"\nname = \"a\"\n"));
+  ASSERT_TRUE(contents) << contents.error().message;
+  EXPECT_EQ(contents->name, "a");
+  EXPECT_EQ(contents->rig_toml, "# mine\n");
+  const auto directory =
+      SessionDirectory::create(system_files(), directory_.path() / "sessions" / "a", *contents);
+  ASSERT_TRUE(directory) << directory.error().message;
+  EXPECT_EQ(load_resolved(*directory).value().name, "a");
+}
+
+}  // namespace
+}  // namespace opaline::config
