@@ -39,6 +39,9 @@ namespace opaline::reconstruct::diffusion {
 /// q.
 ///                       Returns ||r||^2 of every right-hand side: the only read of an iteration.
 ///
+/// In single precision q = c p + sum g (p_i - p_j) with c = D - sum g, differences first: D p - sum g p loses as many
+/// digits as K is ill-conditioned, and conjugate gradients then need half as many iterations again.
+///
 /// A back end may delay d += alpha p up to the next apply_dot or true_residual, and may scale each
 /// right-hand side by a constant of its own, as long as the norms it returns are of the unscaled
 /// fields. The spans live until the next pass.

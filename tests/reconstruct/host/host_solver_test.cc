@@ -1,0 +1,109 @@
+#include "reconstruct/host/host_solver.h"
+
+#include <chrono>
+#include <thread>
+
+#include "reconstruct/diffusion/reference_solver.h"
+#include "tests/reconstruct/support/solver_truths.h"
+
+namespace opaline::reconstruct::host {
+namespace {
+
+using diffusion::FieldBatch;
+using diffusion::FluenceSolver;
+using diffusion::Medium;
+using diffusion::SolveSummary;
+using diffusion::testing::random_fields;
+using diffusion::testing::random_medium;
+using diffusion::testing::worst_difference;
+
+struct TwoThreads {
+  static std::unique_ptr<FluenceSolver> make() { return make_host_solver({.threads = 2}); }
+};
+
+FieldBatch solve(FluenceSolver& solver,
+                 const Medium& medium,
+                 const FieldBatch& b,
+                 double tolerance) {
+  EXPECT_TRUE(solver.prepare(medium));
+  FieldBatch phi(b.cells, b.count);
+  const Result<SolveSummary> solved = solver.solve(b, phi, {tolerance, 100}, {});
+  EXPECT_TRUE(solved);
+  EXPECT_EQ(solved->termination, diffusion::Termination::kConverged) << solved->message;
+  return phi;
+}
+
+// Both end at a residual of 1e-10: they may differ by that times the condition number, about 1e3 here.
+TEST(HostSolver, AgreesWithTheReferenceOnManyShapesAndCounts) {
+  const auto host = make_host_solver({.threads = 3});
+  const auto reference = diffusion::make_reference_solver();
+  const std::vector<std::pair<Block, int>> cases{{{1, 1, 1, 0.5, 0.5, 0.5}, 1},
+                                                 {{17, 33, 5, 0.5, 0.4, 0.3}, 5},
+                                                 {{17, 33, 5, 0.5, 0.4, 0.3}, 1},
+                                                 {{64, 64, 32, 0.5, 0.5, 0.5}, 2},
+                                                 {{5, 3, 41, 0.5, 0.5, 0.1}, 33},
+                                                 {{40, 40, 40, 0.5, 0.5, 1.5}, 1},
+                                                 {{1, 300, 2, 0.5, 0.5, 0.5}, 9},
+                                                 {{300, 1, 1, 0.5, 0.5, 0.5}, 4}};
+  for (const auto& [block, count] : cases) {
+    const Medium medium = random_medium(block, 30.0, 4);
+    const FieldBatch b = random_fields(block, count, 5);
+    EXPECT_LT(worst_difference(solve(*host, medium, b, 1e-10), solve(*reference, medium, b, 1e-10)),
+              1e-7)
+        << block.nx << "x" << block.ny << "x" << block.nz << ", " << count << " fields";
+  }
+}
+
+TEST(HostSolver, GivesTheSameBitsWhateverTheNumberOfThreads) {
+  const Block block{40, 24, 37, 0.5, 0.5, 0.5};
+  const Medium medium = random_medium(block, 30.0, 4);
+  const FieldBatch b = random_fields(block, 17, 5);
+  const FieldBatch one = solve(*make_host_solver({.threads = 1}), medium, b, 1e-6);
+  for (const int threads : {2, 3, 7})
+    EXPECT_EQ(solve(*make_host_solver({.threads = threads}), medium, b, 1e-6).values, one.values);
+}
+
+TEST(HostSolver, ServesOneMediumAfterAnother) {
+  const auto host = make_host_solver({.threads = 2});
+  for (const Block& block : {Block{20, 10, 30, 0.5, 0.5, 0.5}, Block{10, 20, 30, 0.5, 0.5, 0.5}})
+    for (const unsigned seed : {1U, 2U}) {
+      const Medium medium = random_medium(block, 30.0, seed);
+      const FieldBatch b = random_fields(block, 2, seed);
+      const FieldBatch fresh = solve(*make_host_solver({.threads = 2}), medium, b, 1e-8);
+      EXPECT_EQ(solve(*host, medium, b, 1e-8).values, fresh.values);
+    }
+}
+
+// The promise is 100 ms on a quiet machine; ten times that leaves room for sanitizers on a busy one.
+TEST(HostSolver, StopsSoonAfterItIsAskedTo) {
+  const Block block{64, 64, 64, 0.5, 0.5, 0.5};
+  const auto host = make_host_solver({.threads = 2});
+  ASSERT_TRUE(host->prepare(random_medium(block, 1e6, 4)));
+  const FieldBatch b = random_fields(block, 16, 5);
+  FieldBatch phi(b.cells, b.count);
+  std::stop_source stop;
+  std::chrono::steady_clock::time_point asked;
+  std::jthread asker([&] {
+    std::this_thread::yield();
+    asked = std::chrono::steady_clock::now();
+    stop.request_stop();
+  });
+  const Result<SolveSummary> solved = host->solve(b, phi, {1e-14, 1000}, stop.get_token());
+  asker.join();
+  ASSERT_FALSE(solved);
+  EXPECT_EQ(solved.error().code, ErrorCode::kCancelled);
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(1));
+}
+
+TEST(HostSolver, RefusesAnImpossibleNumberOfThreads) {
+  EXPECT_TRUE(validate(HostOptions{}));
+  EXPECT_EQ(validate(HostOptions{.threads = -1}).error().code, ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace opaline::reconstruct::host
+
+namespace opaline::reconstruct::diffusion::testing {
+using opaline::reconstruct::host::TwoThreads;
+INSTANTIATE_TYPED_TEST_SUITE_P(Host, SolverTruths, TwoThreads);
+}  // namespace opaline::reconstruct::diffusion::testing
