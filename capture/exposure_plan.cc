@@ -1,0 +1,69 @@
+#include "capture/exposure_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace opaline::capture {
+namespace {
+
+using std::chrono::nanoseconds;
+
+double count(nanoseconds time) { return static_cast<double>(time.count()); }
+
+double ms(nanoseconds time) { return std::chrono::duration<double, std::milli>(time).count(); }
+
+}  // namespace
+
+Result<std::vector<nanoseconds>> exposure_ladder(const ExposureOptions& options,
+                                                 const ExposureLimits& limits) {
+  const nanoseconds shortest = std::max(options.shortest, limits.shortest);
+  const nanoseconds longest = std::min(options.longest, limits.longest);
+  const nanoseconds period = limits.wheel_period.count() > 0 ? limits.wheel_period : shortest;
+  constexpr double kRounding = 1e-6;  // "1/30 s" in nanoseconds is a little less than a turn
+  const double turns_shortest = count(shortest) / count(period);
+  const double turns_longest = count(longest) / count(period);
+  const auto first = std::max<std::int64_t>(1, std::llround(std::ceil(turns_shortest - kRounding)));
+  const auto last = std::llround(std::floor(turns_longest + kRounding));
+  if (last < first) {
+    return invalid_argument(
+        fmt::format("no whole turn of the colour wheel ({:.3f} ms) lies between the exposures "
+                    "{:.3f} ms and {:.3f} ms that options and camera allow",
+                    ms(period),
+                    ms(shortest),
+                    ms(longest)));
+  }
+  std::vector<nanoseconds> ladder;
+  for (double turns = static_cast<double>(first); std::llround(turns) < last;
+       turns = std::max(turns * options.ratio, turns + 1.0)) {
+    ladder.push_back(period * std::llround(turns));
+  }
+  ladder.push_back(period * last);
+  return ladder;
+}
+
+Bracket::Bracket(const ExposureOptions& options, std::size_t ladder_size)
+    : wanted_snr_(options.wanted_snr), size_(ladder_size) {}
+
+std::optional<std::size_t> Bracket::next() const {
+  if (empty_) return size_ / 2;
+  if (at_lowest_.saturated_share > 0.0 && lowest_ > 0) return lowest_ - 1;
+  if (at_highest_.dark_snr < wanted_snr_ && highest_ + 1 < size_) return highest_ + 1;
+  return std::nullopt;
+}
+
+void Bracket::add(std::size_t index, const ExposureStatistics& statistics) {
+  if (empty_ || index <= lowest_) {
+    lowest_ = index;
+    at_lowest_ = statistics;
+  }
+  if (empty_ || index >= highest_) {
+    highest_ = index;
+    at_highest_ = statistics;
+  }
+  empty_ = false;
+}
+
+}  // namespace opaline::capture

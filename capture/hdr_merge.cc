@@ -1,0 +1,165 @@
+#include "capture/hdr_merge.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "base/ensure.h"
+
+namespace opaline::capture {
+namespace {
+
+constexpr double kFullWeight = 0.65;  // of the code range: weights fall from here ...
+constexpr double kNoWeight = 0.95;    // ... to here
+constexpr double kSaturated = 0.98;   // clipped, in the shortest exposure
+
+double range_share(const CameraCalibration& camera, int code) {
+  return (code - camera.black_level) / (camera.max_code() - camera.black_level);
+}
+
+double weight_of(double share) {
+  return std::clamp((kNoWeight - share) / (kNoWeight - kFullWeight), 0.0, 1.0);
+}
+
+// Of one frame, around `mean` electrons: shot noise, read noise, and quantisation to whole codes.
+double noise_variance(const CameraCalibration& camera, double mean, double per_code) {
+  const double read = camera.read_noise_electrons;
+  return std::max(mean, 0.0) + read * read + per_code * per_code / 12.0;
+}
+
+std::vector<Electrons> electrons_table(const CameraCalibration& camera) {
+  std::vector<Electrons> table(static_cast<std::size_t>(1) << 16);
+  const int last = static_cast<int>(camera.max_code());
+  for (int code = 0; code < static_cast<int>(table.size()); ++code) {
+    table[static_cast<std::size_t>(code)] = electrons_from_code(camera, std::min(code, last));
+  }
+  return table;
+}
+
+}  // namespace
+
+HdrMerge::HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot)
+    : camera_(camera),
+      hot_(std::move(hot)),
+      vignetting_(camera_vignetting(camera)),
+      electrons_(electrons_table(camera)) {
+  ENSURE(hot_.width() == camera.model.width && hot_.height() == camera.model.height);
+}
+
+HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
+                                        int x,
+                                        int y,
+                                        int channel) const {
+  struct Term {
+    double weight, seconds, leak, leak_scale, per_code, black_per_code;
+  };
+  std::array<Term, 64> terms;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+  std::size_t count = 0;
+  double electrons = 0.0;
+  double seconds = 0.0;
+  Sample sample;
+  for (const ExposurePair& pair : sorted) {
+    const std::uint16_t code = pair.light->at(x, y, channel);
+    const double share = range_share(camera_, code);
+    const bool shortest = count == 0;
+    if (shortest) sample.saturated = share >= kSaturated;
+    const double weight = shortest ? 1.0 : weight_of(share);
+    const Electrons& light = electrons_[code];
+    const Electrons& black = electrons_[pair.black->at(x, y, channel)];
+    const double scale = pair.light_seconds / pair.black_seconds;
+    electrons += weight * (light.signal - black.signal * scale);
+    seconds += weight * pair.light_seconds;
+    terms[count++] = {
+        weight, pair.light_seconds, black.signal, scale, light.per_code, black.per_code};
+  }
+  sample.rate = electrons / seconds;
+  double variance = 0.0;
+  for (const Term& t : std::span(terms).first(count)) {
+    const double mean =
+        std::max(sample.rate, 0.0) * t.seconds + std::max(t.leak, 0.0) * t.leak_scale;
+    const double of_light = noise_variance(camera_, mean, t.per_code);
+    const double of_black = noise_variance(camera_, t.leak, t.black_per_code);
+    variance += t.weight * t.weight * (of_light + t.leak_scale * t.leak_scale * of_black);
+  }
+  sample.variance = variance / (seconds * seconds);
+  return sample;
+}
+
+HdrImage HdrMerge::merge(std::span<const ExposurePair> bracket) const {
+  ENSURE(!bracket.empty() && bracket.size() <= 64);
+  std::vector<ExposurePair> sorted(bracket.begin(), bracket.end());
+  std::ranges::stable_sort(sorted, {}, &ExposurePair::light_seconds);
+  const int width = camera_.model.width;
+  const int height = camera_.model.height;
+  HdrImage hdr{Image<float>(width, height, 3),
+               Image<float>(width, height, 3),
+               Image<std::uint8_t>(width, height, 1),
+               Image<std::uint8_t>(width, height, 1)};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      bool saturated = false;
+      for (int c = 0; c < 3; ++c) {
+        const Sample sample = merge_sample(sorted, x, y, c);
+        const double scale =
+            1.0 / (camera_.sensitivity[static_cast<std::size_t>(c)] * vignetting_.at(x, y));
+        hdr.radiance.at(x, y, c) = static_cast<float>(sample.rate * scale);
+        hdr.variance.at(x, y, c) = static_cast<float>(sample.variance * scale * scale);
+        saturated = saturated || sample.saturated;
+      }
+      hdr.saturated.at(x, y) = saturated ? 1 : 0;
+      hdr.mask.at(x, y) = !saturated && hot_.at(x, y) == 0 ? 1 : 0;
+    }
+  }
+  return hdr;
+}
+
+FrameLight measure_light(const CameraCalibration& camera,
+                         const ExposurePair& pair,
+                         const Image<std::uint8_t>& footprint,
+                         double dark_quantile) {
+  const double scale = pair.light_seconds / pair.black_seconds;
+  std::vector<double> snrs;
+  double sum = 0.0;
+  double variance = 0.0;
+  std::size_t pixels = 0;
+  std::size_t saturated = 0;
+  for (int y = 0; y < footprint.height(); ++y) {
+    for (int x = 0; x < footprint.width(); ++x) {
+      if (footprint.at(x, y) == 0) continue;
+      for (int c = 0; c < 3; ++c) {
+        const int code = pair.light->at(x, y, c);
+        ++pixels;
+        if (range_share(camera, code) >= kNoWeight) {
+          ++saturated;
+          continue;
+        }
+        const Electrons light = electrons_from_code(camera, code);
+        const Electrons black = electrons_from_code(camera, pair.black->at(x, y, c));
+        const double net = light.signal - black.signal * scale;
+        const double noise = noise_variance(camera, light.signal, light.per_code) +
+                             scale * scale * noise_variance(camera, black.signal, black.per_code);
+        sum += net;
+        variance += noise;
+        snrs.push_back(net / std::sqrt(noise));
+      }
+    }
+  }
+  FrameLight light;
+  if (pixels == 0) return light;
+  light.statistics.saturated_share = static_cast<double>(saturated) / static_cast<double>(pixels);
+  if (snrs.empty()) {
+    light.statistics.dark_snr = std::sqrt(camera.full_scale_electrons());
+    return light;
+  }
+  const auto place =
+      static_cast<std::ptrdiff_t>(dark_quantile * static_cast<double>(snrs.size() - 1));
+  std::ranges::nth_element(snrs, snrs.begin() + place);
+  light.statistics.dark_snr = snrs[static_cast<std::size_t>(place)];
+  light.mean_electrons = sum / static_cast<double>(snrs.size());
+  light.mean_deviation = std::sqrt(variance) / static_cast<double>(snrs.size());
+  return light;
+}
+
+}  // namespace opaline::capture

@@ -1,0 +1,166 @@
+#include "capture/surface_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "capture/face_geometry.h"
+
+namespace opaline::capture {
+namespace {
+
+using Pixel = CameraModel::Pixel;
+using Polygon = std::vector<Pixel>;
+
+constexpr double kWhole = 1.0 - 1e-4;  // shares of a pixel add up to 1 but for rounding to float
+
+double area_of(const Polygon& polygon) {
+  double twice = 0.0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Pixel& p = polygon[i];
+    const Pixel& q = polygon[(i + 1) % polygon.size()];
+    twice += p.x * q.y - q.x * p.y;
+  }
+  return 0.5 * std::abs(twice);
+}
+
+// The part of a convex polygon where distance(point) >= 0, linear in the point (Sutherland and
+// Hodgman 1974).
+template <class Distance>
+void clip(Polygon& polygon, Polygon& scratch, Distance distance) {
+  scratch.clear();
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Pixel& p = polygon[i];
+    const Pixel& q = polygon[(i + 1) % polygon.size()];
+    const double dp = distance(p);
+    const double dq = distance(q);
+    if (dp >= 0.0) scratch.push_back(p);
+    if ((dp >= 0.0) == (dq >= 0.0)) continue;
+    const double t = dp / (dp - dq);
+    scratch.push_back({p.x + t * (q.x - p.x), p.y + t * (q.y - p.y)});
+  }
+  polygon.swap(scratch);
+}
+
+double shared_area(const Polygon& quad, int x, int y, Polygon& work, Polygon& scratch) {
+  work = quad;
+  clip(work, scratch, [&](const Pixel& p) { return p.x - x; });
+  clip(work, scratch, [&](const Pixel& p) { return x + 1.0 - p.x; });
+  clip(work, scratch, [&](const Pixel& p) { return p.y - y; });
+  clip(work, scratch, [&](const Pixel& p) { return y + 1.0 - p.y; });
+  return area_of(work);
+}
+
+struct Span {
+  int first = 0;
+  int last = 0;  // one past
+};
+
+Span pixels_between(double low, double high, int size) {
+  const double limit = size;
+  return {static_cast<int>(std::clamp(std::floor(low), 0.0, limit)),
+          static_cast<int>(std::clamp(std::ceil(high), 0.0, limit))};
+}
+
+}  // namespace
+
+void SurfaceMap::add_cell(const Polygon& corners, const CameraModel& camera) {
+  const auto [left, right] = std::ranges::minmax(corners, {}, &Pixel::x);
+  const auto [top, bottom] = std::ranges::minmax(corners, {}, &Pixel::y);
+  const Span columns = pixels_between(left.x, right.x, camera.width);
+  const Span rows = pixels_between(top.y, bottom.y, camera.height);
+  Cell& cell = cells_.emplace_back();
+  cell.area = area_of(corners);
+  Polygon work;
+  Polygon scratch;
+  for (int y = rows.first; y < rows.last; ++y) {
+    for (int x = columns.first; x < columns.last; ++x) {
+      const double area = shared_area(corners, x, y, work, scratch);
+      if (area > 0.0) cell.shares.push_back({x, y, static_cast<float>(area)});
+    }
+  }
+}
+
+void SurfaceMap::drop_partial_pixels(const CameraModel& camera) {
+  Image<double> covered(camera.width, camera.height, 1);
+  for (const Cell& cell : cells_) {
+    for (const Share& share : cell.shares) covered.at(share.x, share.y) += share.area;
+  }
+  footprint_ = Image<std::uint8_t>(camera.width, camera.height, 1);
+  std::ranges::transform(covered.samples(), footprint_.samples().begin(), [](double c) {
+    return static_cast<std::uint8_t>(c >= kWhole ? 1 : 0);
+  });
+  for (Cell& cell : cells_) {
+    std::erase_if(cell.shares, [&](const Share& s) { return footprint_.at(s.x, s.y) == 0; });
+  }
+}
+
+Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const CameraModel& camera) {
+  SurfaceMap map(block.face_width(face), block.face_height(face));
+  map.view_cosine_ = Image<float>(map.width_, map.height_, 1);
+  const Vec3 normal = outward_normal(face);
+  const Vec3 eye = camera.centre();
+  for (int row = 0; row < map.height_; ++row) {
+    for (int column = 0; column < map.width_; ++column) {
+      const Vec3 towards = normalized(eye - face_point(block, face, column + 0.5, row + 0.5));
+      const double cosine = dot(normal, towards);
+      if (!(cosine > 0.0)) {
+        return invalid_argument(
+            fmt::format("the camera at ({:.1f}, {:.1f}, {:.1f}) mm is not in front of face {}",
+                        eye.x,
+                        eye.y,
+                        eye.z,
+                        std::string(to_string(face))));
+      }
+      map.view_cosine_.at(column, row) = static_cast<float>(cosine);
+      map.add_cell({camera.project(face_point(block, face, column, row)),
+                    camera.project(face_point(block, face, column + 1, row)),
+                    camera.project(face_point(block, face, column + 1, row + 1)),
+                    camera.project(face_point(block, face, column, row + 1))},
+                   camera);
+    }
+  }
+  map.drop_partial_pixels(camera);
+  const bool seen = std::ranges::any_of(map.footprint_.samples(), [](auto f) { return f != 0; });
+  if (!seen) {
+    return invalid_argument(fmt::format("the camera sees nothing of face {}: is its pose right?",
+                                        std::string(to_string(face))));
+  }
+  return map;
+}
+
+SurfaceRadiance SurfaceMap::apply(const HdrImage& hdr, double min_coverage) const {
+  SurfaceRadiance surface{Image<float>(width_, height_, 3),
+                          Image<float>(width_, height_, 3),
+                          Image<std::uint8_t>(width_, height_, 1)};
+  for (int row = 0; row < height_; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      const Cell& cell = cells_[static_cast<std::size_t>(row) * width_ + column];
+      double area = 0.0;
+      double sum[3] = {};
+      double squares[3] = {};
+      for (const Share& share : cell.shares) {
+        if (hdr.mask.at(share.x, share.y) == 0) continue;
+        const double a = share.area;
+        area += a;
+        for (int c = 0; c < 3; ++c) {
+          sum[c] += a * hdr.radiance.at(share.x, share.y, c);
+          squares[c] += a * a * hdr.variance.at(share.x, share.y, c);
+        }
+      }
+      if (!(area > 0.0) || area < min_coverage * cell.area) continue;
+      surface.mask.at(column, row) = 1;
+      for (int c = 0; c < 3; ++c) {
+        surface.radiance.at(column, row, c) = static_cast<float>(sum[c] / area);
+        surface.variance.at(column, row, c) = static_cast<float>(squares[c] / (area * area));
+      }
+    }
+  }
+  return surface;
+}
+
+}  // namespace opaline::capture

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/block.h"
+#include "base/camera_model.h"
+#include "base/image.h"
+#include "base/result.h"
+#include "capture/hdr_merge.h"
+
+namespace opaline::capture {
+
+/// What the camera saw, on the cells of the seen face.
+struct SurfaceRadiance {
+  Image<float> radiance;     ///< W/(mm^2 sr), 3 channels
+  Image<float> variance;     ///< of it
+  Image<std::uint8_t> mask;  ///< 1: enough usable pixels
+};
+
+/// Takes camera pixels to the cells of the sample's face. A cell, projected into the picture, is a
+/// quadrilateral; its radiance is the mean over the usable pixels it lies on, weighted by the area
+/// shared (exact clipping), and its variance the sum of theirs with the weights squared. Pixels
+/// that reach over the face's edge see something else as well and are left out.
+class SurfaceMap {
+ public:
+  /// Errors: kInvalidArgument when the camera is behind the face or sees none of it.
+  static Result<SurfaceMap> create(const Block& block, Face face, const CameraModel& camera);
+  /// A cell needs `min_coverage` of its area on usable pixels.
+  SurfaceRadiance apply(const HdrImage& hdr, double min_coverage) const;
+  /// 1 for camera pixels that lie wholly on the face.
+  const Image<std::uint8_t>& footprint() const { return footprint_; }
+  /// Cosine between a cell's normal and the direction to the camera, 1 channel.
+  const Image<float>& view_cosine() const { return view_cosine_; }
+
+ private:
+  struct Share {
+    int x;
+    int y;
+    float area;  // of the pixel, in pixels
+  };
+  struct Cell {
+    std::vector<Share> shares;
+    double area = 0.0;  // of the whole quadrilateral, in pixels
+  };
+  SurfaceMap(int width, int height) : width_(width), height_(height) {}
+  void add_cell(const std::vector<CameraModel::Pixel>& corners, const CameraModel& camera);
+  void drop_partial_pixels(const CameraModel& camera);
+  int width_;
+  int height_;
+  std::vector<Cell> cells_;  // row by row
+  Image<std::uint8_t> footprint_;
+  Image<float> view_cosine_;
+};
+
+}  // namespace opaline::capture
