@@ -25,14 +25,11 @@ Signal from_table(const std::vector<double>& table, double fraction) {
   return {table[i] + step * (place - static_cast<double>(i)), step * intervals};
 }
 
-// Below black the curve goes on linearly, so that noise about zero stays without bias.
+// Odd about black, so that noise about zero stays without bias.
 Signal from_gamma(double gamma, double fraction) {
-  constexpr double kFloor = 1e-3;
-  if (fraction >= kFloor) {
-    return {std::pow(fraction, gamma), gamma * std::pow(fraction, gamma - 1.0)};
-  }
-  const double slope = gamma * std::pow(kFloor, gamma - 1.0);
-  return {std::pow(kFloor, gamma) + slope * (fraction - kFloor), slope};
+  const double size = std::max(std::abs(fraction), 1e-3);  // keeps the slope finite
+  return {std::copysign(std::pow(std::abs(fraction), gamma), fraction),
+          gamma * std::pow(size, gamma - 1.0)};
 }
 
 Signal signal_of(const ResponseCurve& curve, double fraction) {

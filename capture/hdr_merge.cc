@@ -131,10 +131,7 @@ FrameLight measure_light(const CameraCalibration& camera,
       for (int c = 0; c < 3; ++c) {
         const int code = pair.light->at(x, y, c);
         ++pixels;
-        if (range_share(camera, code) >= kNoWeight) {
-          ++saturated;
-          continue;
-        }
+        if (range_share(camera, code) >= kNoWeight) ++saturated;
         const Electrons light = electrons_from_code(camera, code);
         const Electrons black = electrons_from_code(camera, pair.black->at(x, y, c));
         const double net = light.signal - black.signal * scale;
@@ -149,10 +146,6 @@ FrameLight measure_light(const CameraCalibration& camera,
   FrameLight light;
   if (pixels == 0) return light;
   light.statistics.saturated_share = static_cast<double>(saturated) / static_cast<double>(pixels);
-  if (snrs.empty()) {
-    light.statistics.dark_snr = std::sqrt(camera.full_scale_electrons());
-    return light;
-  }
   const auto place =
       static_cast<std::ptrdiff_t>(dark_quantile * static_cast<double>(snrs.size() - 1));
   std::ranges::nth_element(snrs, snrs.begin() + place);

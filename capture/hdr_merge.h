@@ -59,7 +59,7 @@ class HdrMerge {
 /// Light of one exposure above black, over the pixels where `footprint` is 1.
 struct FrameLight {
   ExposureStatistics statistics;
-  double mean_electrons = 0.0;  ///< of pixels not saturated, above black
+  double mean_electrons = 0.0;  ///< above black; a clipped pixel counts as what it clipped at
   double mean_deviation = 0.0;  ///< standard deviation of that mean, from noise alone
   bool lit() const {
     return statistics.saturated_share > 0.0 || mean_electrons > 8.0 * mean_deviation;

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/files.h"
+#include "base/frame.h"
+#include "base/result.h"
+#include "drivers/projector.h"
+
+namespace opaline::capture {
+
+/// One accepted frame and what was asked for.
+struct CapturedFrame {
+  std::size_t exposure_index = 0;  ///< in the ladder of exposures
+  std::chrono::nanoseconds exposure_asked{};
+  Frame frame;
+};
+
+/// The raw frames of a session on disk:
+///
+///   LIGHT/INDEX-MILLISECONDSms.png   16-bit, the camera's codes
+///   LIGHT/index.json                 written last: per frame pattern, trigger count, times,
+///   exposure
+///                                    and the SHA-256 of pixels and file; identity of the pattern
+///
+/// So a light is there wholly, or is taken again.
+class FrameStore {
+ public:
+  /// `files` outlives us.
+  FrameStore(FileOperations& files, std::filesystem::path directory)
+      : files_(files), directory_(std::move(directory)) {}
+
+  Result<void> save(const std::string& light,
+                    const drivers::Pattern& pattern,
+                    std::span<const CapturedFrame> frames);
+  /// Every frame, each checked against its SHA-256. None when the light was never captured wholly,
+  /// or with another pattern than this. Errors: kInvalidArgument for a damaged file, naming it.
+  Result<std::optional<std::vector<CapturedFrame>>> load(const std::string& light,
+                                                         const drivers::Pattern& pattern) const;
+  /// Whether the light was captured wholly, as far as names tell.
+  bool has(const std::string& light) const;
+  const std::filesystem::path& directory() const { return directory_; }
+
+ private:
+  FileOperations& files_;
+  std::filesystem::path directory_;
+};
+
+}  // namespace opaline::capture

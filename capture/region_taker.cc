@@ -1,0 +1,244 @@
+#include "capture/region_taker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "base/log.h"
+
+namespace opaline::capture {
+namespace {
+
+using std::chrono::nanoseconds;
+
+double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+
+bool can_retry(ErrorCode code) {
+  return code == ErrorCode::kUnavailable || code == ErrorCode::kTimeout || code == ErrorCode::kBusy;
+}
+
+}  // namespace
+
+std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const {
+  const auto black =
+      std::ranges::find(frames_, light.exposure_asked, &CapturedFrame::exposure_asked);
+  if (black == frames_.end()) return std::nullopt;
+  return ExposurePair{&light.frame.pixels,
+                      &black->frame.pixels,
+                      seconds(light.frame.exposure),
+                      seconds(black->frame.exposure)};
+}
+
+std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
+                                            std::span<const double> times) {
+  // The dimmest lit frame's rate is the least that all others must show.
+  std::optional<double> rate;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    if (!lights[i].lit()) continue;
+    const double own = lights[i].mean_electrons / times[i];
+    rate = rate ? std::min(*rate, own) : own;
+  }
+  if (!rate) return std::nullopt;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const double expected = *rate * times[i];
+    const bool provable = expected > 20.0 * lights[i].mean_deviation;
+    if (provable && lights[i].mean_electrons < 0.2 * expected) return i;
+  }
+  return std::nullopt;
+}
+
+RegionTaker::RegionTaker(const Station& station, const Settings& settings, EventSink& events)
+    : station_(station), settings_(settings), events_(events) {}
+
+RegionTaker::~RegionTaker() {
+  if (auto dark = station_.projector.dark(); !dark) {
+    log::warning("the lamp may still be on: {}", dark.error().message);
+  }
+  station_.camera.close();
+  station_.projector.close();
+}
+
+Result<std::unique_ptr<RegionTaker>> RegionTaker::create(const Station& station,
+                                                         const Settings& settings,
+                                                         EventSink& events) {
+  std::unique_ptr<RegionTaker> taker(new RegionTaker(station, settings, events));
+  if (auto opened = taker->open_devices(); !opened) return opened.error();
+  if (auto planned = taker->plan(); !planned) return planned.error();
+  return taker;
+}
+
+Result<void> RegionTaker::open_devices() {
+  if (auto opened = station_.projector.open(); !opened) return opened.error().in("projector");
+  if (auto opened = station_.camera.open(); !opened) return opened.error().in("camera");
+  auto projector = station_.projector.info();
+  if (!projector) return projector.error().in("projector");
+  auto camera = station_.camera.info();
+  if (!camera) return camera.error().in("camera");
+  projector_ = *std::move(projector);
+  camera_ = *std::move(camera);
+  check_.emplace(camera_);
+  return ok();
+}
+
+Result<void> RegionTaker::plan() {
+  const CameraModel& model = settings_.camera.model;
+  if (camera_.width != model.width || camera_.height != model.height ||
+      camera_.bit_depth != settings_.camera.bit_depth) {
+    return invalid_argument(
+        fmt::format("the camera has {} x {} pixels of {} bits, its calibration {} x {} of {}",
+                    camera_.width,
+                    camera_.height,
+                    camera_.bit_depth,
+                    model.width,
+                    model.height,
+                    settings_.camera.bit_depth));
+  }
+  auto ladder = exposure_ladder(
+      settings_.options.exposures,
+      {projector_.frame_period, camera_.shortest_exposure, camera_.longest_exposure});
+  if (!ladder) return ladder.error();
+  ladder_ = *std::move(ladder);
+  return ok();
+}
+
+std::size_t RegionTaker::frame_bytes() const {
+  return static_cast<std::size_t>(camera_.width) * camera_.height * 3 * sizeof(std::uint16_t);
+}
+
+Result<void> RegionTaker::recover(std::stop_token stop) {
+  station_.camera.close();
+  station_.projector.close();
+  if (!station_.clock.sleep(projector_.frame_period, stop)) return cancelled("while recovering");
+  return open_devices();
+}
+
+Result<TakenLight> RegionTaker::with_retries(const std::string& name,
+                                             const AttemptFunction& attempt,
+                                             std::stop_token stop) {
+  for (int tries = 0;; ++tries) {
+    Attempt taken = attempt();
+    if (taken && (taken->lit || tries == settings_.options.retries)) {
+      taken->retaken = tries;
+      return *std::move(taken);
+    }
+    const Failure failure =
+        taken ? Failure{unavailable("no light in any exposure"), "black"} : taken.error();
+    if (stop.stop_requested()) return cancelled(fmt::format("{}: stopped", name));
+    if (!can_retry(failure.error.code)) return failure.error.in(name);
+    if (tries >= settings_.options.retries) {
+      return failure.error.in(fmt::format("{}, taken {} times", name, tries + 1));
+    }
+    log::warning("{}: {}; taken again ({} of {})",
+                 name,
+                 failure.error.message,
+                 tries + 1,
+                 settings_.options.retries);
+    const auto noted = events_.fact("region.retaken",
+                                    {{"region", name},
+                                     {"attempt", tries + 1},
+                                     {"fault", failure.fault},
+                                     {"message", failure.error.message}});
+    if (!noted) return noted.error();
+    if (failure.fault != "device") continue;
+    if (auto back = recover(stop); !back) log::warning("{}: {}", name, back.error().message);
+  }
+}
+
+std::optional<RegionTaker::Failure> RegionTaker::show(const drivers::Pattern& pattern,
+                                                      std::stop_token stop) {
+  if (auto shown = station_.projector.show(pattern, stop); !shown) {
+    return Failure{shown.error().in("projector"), "device"};
+  }
+  const nanoseconds settle =
+      projector_.latency + projector_.frame_period * settings_.options.settle_periods;
+  if (!station_.clock.sleep(settle, stop)) return Failure{cancelled("while settling"), "stop"};
+  return std::nullopt;
+}
+
+RegionTaker::CaptureResult RegionTaker::capture(std::uint64_t pattern_id,
+                                                std::size_t index,
+                                                const Watcher& watcher,
+                                                std::stop_token stop) {
+  const nanoseconds exposure = ladder_[index];
+  if (watcher) watcher(exposure);
+  const std::string where = fmt::format("exposure of {:.4g} s", seconds(exposure));
+  auto frame = station_.camera.capture({exposure, pattern_id}, stop);
+  if (!frame) {
+    check_->forget();
+    return tl::unexpected(Failure{frame.error().in(where), "device"});
+  }
+  if (const auto problem = check_->check(*frame, pattern_id, exposure)) {
+    return tl::unexpected(
+        Failure{unavailable(fmt::format(
+                    "{}: {} frame: {}", where, to_string(problem->fault), problem->message)),
+                std::string(to_string(problem->fault))});
+  }
+  return CapturedFrame{index, exposure, *std::move(frame)};
+}
+
+RegionTaker::Attempt RegionTaker::attempt_black(const drivers::Pattern& black,
+                                                const Watcher& watcher,
+                                                std::stop_token stop) {
+  if (auto failure = show(black, stop)) return tl::unexpected(*std::move(failure));
+  TakenLight taken{{}, true, 0};
+  for (std::size_t i = 0; i < ladder_.size(); ++i) {
+    auto frame = capture(black.id, i, watcher, stop);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    taken.frames.push_back(*std::move(frame));
+  }
+  return taken;
+}
+
+RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
+                                                const BlackFrames& black,
+                                                const Watcher& watcher,
+                                                std::stop_token stop) {
+  if (auto failure = show(pattern, stop)) return tl::unexpected(*std::move(failure));
+  TakenLight taken;
+  std::vector<FrameLight> lights;
+  std::vector<double> times;
+  Bracket bracket(settings_.options.exposures, ladder_.size());
+  while (const auto index = bracket.next()) {
+    auto frame = capture(pattern.id, *index, watcher, stop);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    const auto pair = black.pair(*frame);
+    if (!pair) {
+      return tl::unexpected(Failure{internal_error("no black frame for this exposure"), "black"});
+    }
+    lights.push_back(measure_light(
+        settings_.camera, *pair, settings_.footprint, settings_.options.exposures.dark_quantile));
+    times.push_back(pair->light_seconds);
+    bracket.add(*index, lights.back().statistics);
+    taken.lit = taken.lit || lights.back().lit();
+    taken.frames.push_back(*std::move(frame));
+  }
+  if (const auto dark = find_black_frame(lights, times)) {
+    const double asked = seconds(taken.frames[*dark].exposure_asked);
+    return tl::unexpected(
+        Failure{unavailable(fmt::format(
+                    "exposure of {:.4g} s: black frame: other exposures show light", asked)),
+                std::string(to_string(FrameFault::kBlack))});
+  }
+  std::ranges::sort(taken.frames, {}, &CapturedFrame::exposure_index);
+  return taken;
+}
+
+Result<TakenLight> RegionTaker::take_black(const drivers::Pattern& black,
+                                           const Watcher& watcher,
+                                           std::stop_token stop) {
+  return with_retries(
+      "black", [&] { return attempt_black(black, watcher, stop); }, stop);
+}
+
+Result<TakenLight> RegionTaker::take_light(const std::string& name,
+                                           const drivers::Pattern& pattern,
+                                           const BlackFrames& black,
+                                           const Watcher& watcher,
+                                           std::stop_token stop) {
+  return with_retries(
+      name, [&] { return attempt_light(pattern, black, watcher, stop); }, stop);
+}
+
+}  // namespace opaline::capture

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "base/events.h"
+#include "base/image.h"
+#include "base/result.h"
+#include "capture/calibration.h"
+#include "capture/capture_options.h"
+#include "capture/exposure_plan.h"
+#include "capture/frame_check.h"
+#include "capture/frame_store.h"
+#include "capture/hdr_merge.h"
+#include "capture/station.h"
+
+namespace opaline::capture {
+
+/// Black frames by exposure, to subtract.
+class BlackFrames {
+ public:
+  BlackFrames() = default;
+  explicit BlackFrames(std::vector<CapturedFrame> frames) : frames_(std::move(frames)) {}
+  std::span<const CapturedFrame> frames() const { return frames_; }
+  /// The pair of a frame with the black of its exposure; none when there is no such black.
+  std::optional<ExposurePair> pair(const CapturedFrame& light) const;
+
+ private:
+  std::vector<CapturedFrame> frames_;
+};
+
+/// The frames of one light, and whether any shows light at all.
+struct TakenLight {
+  std::vector<CapturedFrame> frames;
+  bool lit = false;
+  int retaken = 0;  ///< how often frames were bad and the light was taken again
+};
+
+/// Takes one light after another: shows it, lets it settle, exposes, checks every frame. A light
+/// with a bad frame is taken again from its first exposure, up to the retries allowed; each time is
+/// a fact, "region.retaken" {region, attempt, fault, message}. Devices that were lost are closed
+/// and opened again between the tries.
+///
+/// Threads: one caller at a time. Waits as the devices do. Errors: kUnavailable or kTimeout, naming
+/// light and exposure, when the retries are used up; kCancelled; kInvalidArgument.
+class RegionTaker {
+ public:
+  struct Settings {
+    CaptureOptions options;
+    CameraCalibration camera;
+    Image<std::uint8_t> footprint;  ///< camera pixels that see the sample
+  };
+  /// Opens the devices. `events` outlives us.
+  static Result<std::unique_ptr<RegionTaker>> create(const Station& station,
+                                                     const Settings& settings,
+                                                     EventSink& events);
+  /// Leaves the lamp dark.
+  ~RegionTaker();
+  RegionTaker(const RegionTaker&) = delete;
+  RegionTaker& operator=(const RegionTaker&) = delete;
+
+  /// Called before each exposure, for those who watch.
+  using Watcher = std::function<void(std::chrono::nanoseconds exposure)>;
+
+  /// The black pattern at every exposure of the ladder.
+  Result<TakenLight> take_black(const drivers::Pattern& black,
+                                const Watcher& watcher,
+                                std::stop_token stop);
+  /// A bracket of one light. Not lit when even the longest exposure shows nothing, each time.
+  Result<TakenLight> take_light(const std::string& name,
+                                const drivers::Pattern& pattern,
+                                const BlackFrames& black,
+                                const Watcher& watcher,
+                                std::stop_token stop);
+  std::span<const std::chrono::nanoseconds> ladder() const { return ladder_; }
+  /// Bytes of one raw frame.
+  std::size_t frame_bytes() const;
+
+ private:
+  struct Failure {
+    Error error;
+    std::string fault;
+  };
+  using Attempt = tl::expected<TakenLight, Failure>;
+  using AttemptFunction = std::function<Attempt()>;
+  using CaptureResult = tl::expected<CapturedFrame, Failure>;
+
+  RegionTaker(const Station& station, const Settings& settings, EventSink& events);
+  Result<void> open_devices();
+  Result<void> plan();
+  Result<void> recover(std::stop_token stop);
+  Result<TakenLight> with_retries(const std::string& name,
+                                  const AttemptFunction& attempt,
+                                  std::stop_token stop);
+  std::optional<Failure> show(const drivers::Pattern& pattern, std::stop_token stop);
+  CaptureResult capture(std::uint64_t pattern_id,
+                        std::size_t index,
+                        const Watcher& watcher,
+                        std::stop_token stop);
+  Attempt attempt_black(const drivers::Pattern& black,
+                        const Watcher& watcher,
+                        std::stop_token stop);
+  Attempt attempt_light(const drivers::Pattern& pattern,
+                        const BlackFrames& black,
+                        const Watcher& watcher,
+                        std::stop_token stop);
+
+  Station station_;
+  Settings settings_;
+  EventSink& events_;
+  drivers::ProjectorInfo projector_;
+  drivers::CameraInfo camera_;
+  std::optional<FrameCheck> check_;
+  std::vector<std::chrono::nanoseconds> ladder_;
+};
+
+/// A frame without light though another of the same bracket proves that there is some: its index.
+/// `lights` are of the frames in any order, `seconds` their exposures.
+std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
+                                            std::span<const double> seconds);
+
+}  // namespace opaline::capture

@@ -1,0 +1,367 @@
+#include "capture/sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "base/io/dataset_io.h"
+#include "base/log.h"
+#include "capture/dataset_builder.h"
+#include "capture/frame_store.h"
+#include "capture/hdr_file.h"
+#include "capture/hdr_merge.h"
+#include "capture/patterns.h"
+#include "capture/region_taker.h"
+#include "capture/surface_map.h"
+
+namespace opaline::capture {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::nanoseconds;
+
+constexpr const char* kBlackName = "black";
+constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
+
+double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+
+Result<std::uint64_t> free_on_disk(const fs::path& directory) {
+  std::error_code error;
+  const fs::space_info space = fs::space(directory, error);
+  if (error) {
+    return unavailable(
+        fmt::format("cannot tell the free space of {}: {}", directory.string(), error.message()));
+  }
+  return static_cast<std::uint64_t>(space.available);
+}
+
+bool any_set(const Image<std::uint8_t>& mask) {
+  return std::ranges::any_of(mask.samples(), [](std::uint8_t m) { return m != 0; });
+}
+
+/// One run over a session directory.
+class Sequence {
+ public:
+  Sequence(const CaptureTask& task,
+           const Station& station,
+           const Workplace& workplace,
+           PatternSet patterns,
+           SurfaceMap map)
+      : task_(task),
+        station_(station),
+        work_(workplace),
+        patterns_(std::move(patterns)),
+        map_(std::move(map)),
+        store_(workplace.files, workplace.directory / "frames"),
+        dataset_(empty_dataset(task.sample, map_)),
+        started_(station.clock.now()) {}
+
+  Result<CaptureSummary> run(std::stop_token stop);
+
+ private:
+  struct Frames {
+    std::vector<CapturedFrame> frames;
+    bool lit = true;
+  };
+  Result<void> prepare(std::stop_token stop);
+  Result<void> check_space() const;
+  Result<RegionTaker*> taker();
+  Result<void> take_black(std::stop_token stop);
+  Result<void> do_light(const Light& light, std::stop_token stop);
+  Result<std::optional<std::vector<CapturedFrame>>> load(const std::string& name,
+                                                         const drivers::Pattern& pattern);
+  Result<Frames> frames_of(const Light& light, std::stop_token stop);
+  Result<Frames> take(const Light& light, std::stop_token stop);
+  Result<void> confirm_lamp(const std::string& region, std::stop_token stop);
+  Result<std::vector<ExposurePair>> pairs_of(const std::string& name,
+                                             std::span<const CapturedFrame> frames) const;
+  bool shows_light(std::span<const ExposurePair> pairs) const;
+  Result<void> note_unusable(const Light& light, std::string_view why);
+  Result<void> finish();
+  void report(const std::string& region, std::optional<nanoseconds> exposure) const;
+
+  const CaptureTask& task_;
+  const Station& station_;
+  const Workplace& work_;
+  PatternSet patterns_;
+  SurfaceMap map_;
+  FrameStore store_;
+  Dataset dataset_;
+  nanoseconds started_;
+  CaptureSummary summary_;
+  BlackFrames black_;
+  std::unique_ptr<RegionTaker> taker_;
+  std::optional<HdrMerge> merge_;
+  int unusable_regions_ = 0;
+};
+
+Result<CaptureSummary> Sequence::run(std::stop_token stop) {
+  if (auto prepared = prepare(stop); !prepared) return prepared.error();
+  for (const Light& light : patterns_.lights) {
+    if (stop.stop_requested()) return cancelled(fmt::format("before {}", light.name));
+    if (auto done = do_light(light, stop); !done) return done.error();
+    ++summary_.lights;
+  }
+  if (auto finished = finish(); !finished) return finished.error();
+  return summary_;
+}
+
+Result<void> Sequence::prepare(std::stop_token stop) {
+  for (const fs::path& directory : {store_.directory(), work_.directory / "hdr"}) {
+    if (auto made = work_.files.make_directories(directory); !made) return made;
+  }
+  const auto count = [&](bool held_out) {
+    return std::ranges::count(patterns_.lights, held_out, &Light::held_out);
+  };
+  const auto noted =
+      work_.events.fact("capture.planned", {{"regions", count(false)}, {"held_out", count(true)}});
+  if (!noted) return noted;
+  if (auto black = take_black(stop); !black) return black;
+  std::vector<const Image<std::uint16_t>*> frames;
+  for (const CapturedFrame& captured : black_.frames()) frames.push_back(&captured.frame.pixels);
+  merge_.emplace(task_.calibration.camera, find_hot_pixels(task_.calibration.camera, frames));
+  return ok();
+}
+
+// The devices are opened only when something is left to take.
+Result<RegionTaker*> Sequence::taker() {
+  if (taker_) return taker_.get();
+  auto made = RegionTaker::create(
+      station_, {task_.options, task_.calibration.camera, map_.footprint()}, work_.events);
+  if (!made) return made.error();
+  taker_ = *std::move(made);
+  if (auto space = check_space(); !space) return space.error();
+  return taker_.get();
+}
+
+// Frames and pictures are counted at their size before compression.
+Result<void> Sequence::check_space() const {
+  const std::uint64_t frames = taker_->ladder().size() * taker_->frame_bytes();
+  const std::uint64_t picture = taker_->frame_bytes() / 6 * 8 * sizeof(float);
+  const auto missing = static_cast<std::uint64_t>(std::ranges::count_if(
+      patterns_.lights, [&](const Light& light) { return !store_.has(light.name); }));
+  const std::uint64_t faces = task_.sample.block.face_cell_count(task_.sample.lit_face) +
+                              task_.sample.block.face_cell_count(task_.sample.seen_face);
+  const std::uint64_t dataset = faces * 7 * sizeof(float) * patterns_.lights.size();
+  const std::uint64_t black = store_.has(kBlackName) ? 0 : frames;
+  const std::uint64_t needed = missing * (frames + picture) + black + dataset + kSpareBytes;
+  const auto free =
+      work_.free_bytes ? work_.free_bytes(work_.directory) : free_on_disk(work_.directory);
+  if (!free) return free.error();
+  if (*free >= needed) return ok();
+  return unavailable(
+      fmt::format("{} needs {} bytes for the {} lights still to take, and {} are free: make room "
+                  "and start again, nothing already captured is lost",
+                  work_.directory.string(),
+                  needed,
+                  missing,
+                  *free));
+}
+
+Result<std::optional<std::vector<CapturedFrame>>> Sequence::load(const std::string& name,
+                                                                 const drivers::Pattern& pattern) {
+  using Loaded = std::optional<std::vector<CapturedFrame>>;
+  auto loaded = store_.load(name, pattern);
+  if (loaded) {
+    const CameraModel& model = task_.calibration.camera.model;
+    const bool fits = !*loaded || std::ranges::all_of(**loaded, [&](const CapturedFrame& c) {
+      return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height &&
+             c.frame.pixels.channels() == 3;
+    });
+    return fits ? *std::move(loaded) : Loaded();
+  }
+  log::warning("{}; {} is taken again", loaded.error().message, name);
+  const auto noted =
+      work_.events.fact("region.damaged", {{"region", name}, {"message", loaded.error().message}});
+  if (!noted) return noted.error();
+  return Loaded();
+}
+
+Result<void> Sequence::take_black(std::stop_token stop) {
+  auto stored = load(kBlackName, patterns_.black);
+  if (!stored) return stored.error();
+  if (*stored) {
+    black_ = BlackFrames(**std::move(stored));
+    return ok();
+  }
+  auto devices = taker();
+  if (!devices) return devices.error();
+  auto taken = (*devices)->take_black(
+      patterns_.black, [this](nanoseconds exposure) { report(kBlackName, exposure); }, stop);
+  if (!taken) return taken.error();
+  if (auto saved = store_.save(kBlackName, patterns_.black, taken->frames); !saved) return saved;
+  black_ = BlackFrames(std::move(taken->frames));
+  return ok();
+}
+
+Result<std::vector<ExposurePair>> Sequence::pairs_of(const std::string& name,
+                                                     std::span<const CapturedFrame> frames) const {
+  std::vector<ExposurePair> pairs;
+  for (const CapturedFrame& frame : frames) {
+    const auto pair = black_.pair(frame);
+    if (!pair) {
+      return internal_error(
+          fmt::format("{}: no black frame of {:.4g} s: delete frames/{} and start again",
+                      name,
+                      seconds(frame.exposure_asked),
+                      kBlackName));
+    }
+    pairs.push_back(*pair);
+  }
+  return pairs;
+}
+
+bool Sequence::shows_light(std::span<const ExposurePair> pairs) const {
+  return std::ranges::any_of(pairs, [this](const ExposurePair& pair) {
+    return measure_light(task_.calibration.camera, pair, map_.footprint(), 0.0).lit();
+  });
+}
+
+Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token stop) {
+  auto stored = load(light.name, light.pattern);
+  if (!stored) return stored.error();
+  if (!*stored) return take(light, stop);
+  Frames found{**std::move(stored)};
+  const auto pairs = pairs_of(light.name, found.frames);
+  if (!pairs) return pairs.error();
+  found.lit = shows_light(*pairs);
+  return found;
+}
+
+Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop) {
+  auto devices = taker();
+  if (!devices) return devices.error();
+  auto taken = (*devices)->take_light(
+      light.name,
+      light.pattern,
+      black_,
+      [&](nanoseconds exposure) { report(light.name, exposure); },
+      stop);
+  if (!taken) return taken.error();
+  summary_.retaken += taken->retaken;
+  if (!taken->lit) {
+    if (auto lamp = confirm_lamp(light.name, stop); !lamp) return lamp.error();
+  }
+  if (auto saved = store_.save(light.name, light.pattern, taken->frames); !saved)
+    return saved.error();
+  ++summary_.taken;
+  const auto noted = work_.events.fact("region.captured",
+                                       {{"region", light.name},
+                                        {"held_out", light.held_out},
+                                        {"exposures", taken->frames.size()},
+                                        {"retaken", taken->retaken}});
+  if (!noted) return noted.error();
+  return Frames{std::move(taken->frames), taken->lit};
+}
+
+// A region without light is the sample's doing if the whole lit picture shows some, else the
+// lamp's.
+Result<void> Sequence::confirm_lamp(const std::string& region, std::stop_token stop) {
+  auto white = taker_->take_light(
+      "white", patterns_.white, black_, [&](nanoseconds t) { report("white", t); }, stop);
+  if (!white) return white.error();
+  if (white->lit) return ok();
+  return unavailable(fmt::format(
+      "{} is black even at {:.4g} s, and so is the whole picture lit: is the lamp on, the "
+      "projector's cable in, the lens cap off? Then start again: it goes on at {}",
+      region,
+      seconds(taker_->ladder().back()),
+      region));
+}
+
+Result<void> Sequence::note_unusable(const Light& light, std::string_view why) {
+  log::warning("{} is masked: {}", light.name, why);
+  summary_.unusable.push_back(light.name);
+  const auto noted =
+      work_.events.fact("region.unusable", {{"region", light.name}, {"message", std::string(why)}});
+  if (!noted || light.held_out) return noted;
+  ++unusable_regions_;
+  const auto regions = std::ranges::count(patterns_.lights, false, &Light::held_out);
+  const double usable = 1.0 - static_cast<double>(unusable_regions_) / static_cast<double>(regions);
+  if (usable >= task_.options.usable_share) return ok();
+  return unavailable(fmt::format("{} of {} regions cannot be used; the last, {}: {}",
+                                 unusable_regions_,
+                                 regions,
+                                 light.name,
+                                 why));
+}
+
+Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
+  report(light.name, std::nullopt);
+  auto found = frames_of(light, stop);
+  if (!found) return found.error();
+  const auto pairs = pairs_of(light.name, found->frames);
+  if (!pairs) return pairs.error();
+  const HdrImage hdr = merge_->merge(*pairs);
+  const fs::path path = work_.directory / "hdr" / (light.name + ".exr");
+  if (auto written = write_hdr(work_.files, path, hdr); !written) return written;
+  const SurfaceRadiance surface = map_.apply(hdr, task_.options.min_coverage);
+  dataset_.illuminations.push_back(illumination_of(
+      light, surface, task_.sample, task_.options.direct_light_margin_mm, found->lit));
+  if (!found->lit) {
+    return note_unusable(
+        light,
+        "it is black at every exposure though the lamp works: is the sample opaque "
+        "there, or something in the light's way?");
+  }
+  if (any_set(surface.mask)) return ok();
+  return note_unusable(
+      light,
+      "every pixel is saturated even at the shortest exposure: close the aperture or "
+      "dim the lamp, bring the calibration up to date, and start a new session");
+}
+
+Result<void> Sequence::finish() {
+  taker_.reset();  // the lamp is dark from here on
+  if (auto written = write_dataset(work_.files, work_.directory, dataset_); !written)
+    return written;
+  return work_.events.fact("capture.completed",
+                           {{"lights", summary_.lights},
+                            {"taken", summary_.taken},
+                            {"retaken", summary_.retaken},
+                            {"unusable", summary_.unusable}});
+}
+
+void Sequence::report(const std::string& region, std::optional<nanoseconds> exposure) const {
+  const auto total = static_cast<double>(patterns_.lights.size());
+  Progress progress{"capture", summary_.lights / total, std::nullopt, nlohmann::json::object()};
+  progress.detail = {
+      {"region", region}, {"index", summary_.lights + 1}, {"total", patterns_.lights.size()}};
+  if (exposure) progress.detail["exposure_s"] = seconds(*exposure);
+  if (summary_.taken > 0) {
+    const double elapsed = seconds(station_.clock.now() - started_);
+    progress.seconds_left = elapsed / summary_.taken * (total - summary_.lights);
+  }
+  work_.events.progress(progress);
+}
+
+Result<void> check_sizes(const CaptureTask& task) {
+  if (auto options = validate(task.options); !options) return options;
+  if (auto calibration = validate(task.calibration); !calibration) return calibration;
+  const Block& b = task.sample.block;
+  const bool good = b.nx > 0 && b.ny > 0 && b.nz > 0 && b.hx > 0.0 && b.hy > 0.0 && b.hz > 0.0;
+  if (!good) return invalid_argument("sample: expected a block of cells with sizes > 0");
+  return ok();
+}
+
+}  // namespace
+
+Result<CaptureSummary> capture_session(const CaptureTask& task,
+                                       const Station& station,
+                                       const Workplace& workplace,
+                                       std::stop_token stop) {
+  if (auto checked = check_sizes(task); !checked) return checked.error();
+  auto patterns = make_patterns(
+      task.options.patterns, task.sample.block, task.sample.lit_face, task.calibration.projector);
+  if (!patterns) return patterns.error();
+  auto map =
+      SurfaceMap::create(task.sample.block, task.sample.seen_face, task.calibration.camera.model);
+  if (!map) return map.error();
+  return Sequence(task, station, workplace, *std::move(patterns), *std::move(map)).run(stop);
+}
+
+}  // namespace opaline::capture
