@@ -31,20 +31,20 @@ struct Vignetting {
 
 /// What the capture believes of its camera. A pixel sees
 ///
-///   electrons = sensitivity . radiance . exposure . vignetting + leaks,   s = electrons /
-///   full_scale code      = black_level + (max_code - black_level) . f(s),            full_scale =
-///   gain (max_code - black_level)
+///   electrons  = sensitivity . radiance . exposure . vignetting + leaks
+///   full_scale = gain (max_code - black_level),   s = electrons / full_scale
+///   code       = black_level + (max_code - black_level) . f(s)
 struct CameraCalibration {
   CameraModel model;
   int bit_depth = 12;
   ResponseCurve response;
-  double black_level = 64.0;  ///< code without light
-  double gain_electrons_per_code = 2.5;
+  double black_level = 64.0;                         ///< code without light
+  double gain_electrons_per_code = 2.5;              ///< of the linear response
   double read_noise_electrons = 3.0;                 ///< standard deviation
   Vignetting vignetting;                             ///< about the picture's middle
   std::array<double, 3> sensitivity{1e9, 1e9, 1e9};  ///< electrons per (W/(mm^2 sr) s), per channel
-  std::vector<std::pair<int, int>>
-      hot_pixels;  ///< known ones, (x, y); others are found in the black frames
+  /// Known ones, (x, y); others are found in the black frames.
+  std::vector<std::pair<int, int>> hot_pixels;
 
   double max_code() const { return static_cast<double>((1 << bit_depth) - 1); }
   double full_scale_electrons() const {
@@ -54,9 +54,8 @@ struct CameraCalibration {
 
 /// What the capture believes of its projector, whose light falls perpendicular on the lit face:
 ///
-///   (column mm, row mm) = ((x - offset_x_px), (y - offset_y_px)) . mm_per_pixel          x, y in
-///   projector pixels irradiance = peak . vignetting . (black_level + (1 - black_level)
-///   (code/255)^gamma)
+///   (column mm, row mm) = (x - offset_x_px, y - offset_y_px) . mm_per_pixel     x, y in its pixels
+///   irradiance = peak . vignetting . (black_level + (1 - black_level) (code/255)^gamma)
 struct ProjectorCalibration {
   int width = 640;
   int height = 480;
@@ -66,8 +65,8 @@ struct ProjectorCalibration {
   double gamma = 2.2;
   double black_level = 0.001;  ///< light at code 0, as a fraction of the peak
   Vignetting vignetting;       ///< about the middle of the projector's picture
-  std::array<double, 3> peak_irradiance{
-      1e-3, 1e-3, 1e-3};  ///< at code 255 in the middle, W/mm^2, per channel
+  /// At code 255 in the middle, W/mm^2, per channel.
+  std::array<double, 3> peak_irradiance{1e-3, 1e-3, 1e-3};
 };
 
 /// Everything measured beforehand about a station; read from the rig file.

@@ -11,32 +11,27 @@ namespace opaline::capture {
 struct ExposureOptions {
   std::chrono::nanoseconds shortest{33'333'333};    ///< > 0
   std::chrono::nanoseconds longest{8'000'000'000};  ///< >= shortest
-  double ratio = 4.0;  ///< each exposure over the one before; > 1, at most 16
-  double wanted_snr =
-      50.0;  ///< of a dark pixel on the sample: longer exposures are added until it is met; > 0
+  double ratio = 4.0;           ///< each exposure over the one before; > 1, at most 16
+  double wanted_snr = 50.0;     ///< of a dark pixel on the sample: exposures grow until met; > 0
   double dark_quantile = 0.05;  ///< which pixel counts as dark; 0 to 0.5
 };
 
 /// Which lights the sample is measured under.
 struct PatternOptions {
   int regions = 4;          ///< n: the lit face in n x n regions; 1 to 32
-  int held_out_lights = 8;  ///< shifted by half a region, twice as large, half as large: never used
-                            ///< in the fit; 0 to 8
+  int held_out_lights = 8;  ///< shifted by half a region, larger, smaller: never fitted; 0 to 8
 };
 
 /// How a session is captured.
 struct CaptureOptions {
   PatternOptions patterns;
   ExposureOptions exposures;
-  int retries =
-      3;  ///< times a region is taken again after a bad frame before the session stops; 0 to 100
-  int settle_periods = 2;  ///< projector frames to wait on top of its latency; 0 to 1000
-  double min_coverage =
-      0.5;  ///< share of a surface cell that usable camera pixels must see; 0 < c <= 1
-  double direct_light_margin_mm =
-      3.0;  ///< around a lit region that shares its face with the camera's view: masked; >= 0
-  double usable_share =
-      0.5;  ///< of the regions: fewer usable ones end the session with an error; 0 to 1
+  int retries = 3;            ///< of a light with a bad frame, before the session stops; 0 to 100
+  int settle_periods = 2;     ///< projector frames to wait on top of its latency; 0 to 1000
+  double min_coverage = 0.5;  ///< of a surface cell by usable camera pixels; 0 < c <= 1
+  /// Around a lit region on the face the camera looks at: masked; >= 0.
+  double direct_light_margin_mm = 3.0;
+  double usable_share = 0.5;  ///< of the regions: fewer usable ones end the session; 0 to 1
 };
 
 /// The sample, as the session describes it.

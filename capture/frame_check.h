@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "base/frame.h"
 #include "drivers/camera.h"
@@ -35,7 +36,8 @@ struct FrameProblem {
 class FrameCheck {
  public:
   explicit FrameCheck(drivers::CameraInfo camera) : camera_(std::move(camera)) {}
-  /// None when the frame is what was asked for. Good or bad, it becomes the frame before the next.
+  /// None when the frame is what was asked for. Good or bad, it becomes the frame before the next,
+  /// but after a bad one it is not known where the camera's count stands.
   std::optional<FrameProblem> check(const Frame& frame,
                                     std::uint64_t pattern_id,
                                     std::chrono::nanoseconds exposure);
@@ -45,7 +47,7 @@ class FrameCheck {
 
  private:
   struct Before {
-    std::uint64_t trigger_count;
+    std::optional<std::uint64_t> trigger_count;  ///< none when not known
     std::chrono::nanoseconds end;
     std::uint64_t pattern_id;
     std::chrono::nanoseconds exposure_asked;

@@ -1,0 +1,338 @@
+#include "capture/sequence.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/io/dataset_io.h"
+#include "capture/patterns.h"
+#include "tests/support/simulated_station.h"
+#include "tests/support/temporary_directory.h"
+#include "tests/support/tiny_capture.h"
+
+namespace opaline::capture {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+namespace fs = std::filesystem;
+
+using Files = std::vector<std::pair<std::string, std::vector<std::byte>>>;
+
+/// What must be equal whatever happened on the way: HDR pictures and the dataset.
+Files results_of(const fs::path& directory) {
+  Files files = support::files_below(directory / "hdr");
+  for (const char* name : {"dataset.exr", "dataset_light.exr", "dataset.json"}) {
+    auto bytes = read_bytes(directory / name, 1u << 30);
+    files.emplace_back(name, bytes ? *std::move(bytes) : std::vector<std::byte>{});
+  }
+  return files;
+}
+
+class SequenceTest : public ::testing::Test {
+ protected:
+  Result<CaptureSummary> run(const fs::path& directory, std::stop_token stop = {}) {
+    support::TinyStation tiny(options_);
+    events_ = std::make_unique<support::RecordingSink>();
+    const Workplace workplace{directory, system_files(), *events_, free_bytes_};
+    auto summary = capture_session(task_, tiny.station(), workplace, stop);
+    lamp_on_ = tiny.rig().status()->lamp_on;
+    exposures_ = tiny.rig().status()->exposures;
+    return summary;
+  }
+  /// An undisturbed run's results, taken once for all tests.
+  static const Files& undisturbed() {
+    static const Files files = [] {
+      const testing::TemporaryDirectory dir;
+      support::TinyStation tiny(support::tiny_rig());
+      NullSink events;
+      const auto task = support::tiny_task(support::tiny_rig());
+      const auto done =
+          capture_session(task, tiny.station(), {dir.path(), system_files(), events}, {});
+      EXPECT_TRUE(done) << done.error().message;
+      return results_of(dir.path());
+    }();
+    return files;
+  }
+  void expect_recovers_from(sim::Faults faults, const std::string& fault) {
+    options_.faults = std::move(faults);
+    const auto summary = run(dir_.path());
+    ASSERT_TRUE(summary) << summary.error().message;
+    EXPECT_EQ(summary->retaken, 1);
+    const auto retaken = events_->facts("region.retaken");
+    ASSERT_EQ(retaken.size(), 1u);
+    EXPECT_EQ(retaken[0]["fault"], fault) << retaken[0].dump();
+    EXPECT_EQ(results_of(dir_.path()), undisturbed());
+  }
+
+  testing::TemporaryDirectory dir_;
+  sim::RigOptions options_ = support::tiny_rig();
+  CaptureTask task_ = support::tiny_task(options_);
+  std::unique_ptr<support::RecordingSink> events_;
+  std::function<Result<std::uint64_t>(const fs::path&)> free_bytes_;
+  bool lamp_on_ = true;
+  std::uint64_t exposures_ = 0;
+};
+
+TEST_F(SequenceTest, CapturesEveryRegionAndHeldOutLightIntoADataset) {
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->lights, 11);
+  EXPECT_EQ(summary->taken, 11);
+  EXPECT_THAT(summary->unusable, IsEmpty());
+  EXPECT_FALSE(lamp_on_);
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set) << set.error().message;
+  ASSERT_EQ(set->illuminations.size(), 11u);
+  EXPECT_EQ(set->illuminations[0].name, "region_0_0");
+  EXPECT_EQ(std::ranges::count(set->illuminations, true, &Illumination::held_out), 7);
+  EXPECT_TRUE(fs::exists(dir_.path() / "hdr" / "region_1_1.exr"));
+}
+
+// The rig's truth under each region against what was measured, in units of the measured deviation:
+// with a perfect calibration the squares average 1, but for what the camera's blur and the
+// pixels' sampling of one-millimetre cells add.
+TEST_F(SequenceTest, MeasuresTheRadianceTheSampleSends) {
+  options_.camera.psf_sigma_px = 0.0;
+  task_ = support::tiny_task(options_);
+  ASSERT_TRUE(run(dir_.path()));
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set);
+  support::TinyStation tiny(options_);
+  sim::SimProjector projector(tiny.rig());
+  ASSERT_TRUE(projector.open());
+  const auto patterns = make_patterns(task_.options.patterns,
+                                      task_.sample.block,
+                                      task_.sample.lit_face,
+                                      task_.calibration.projector);
+  for (std::size_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE(projector.show(patterns->black, {}));
+    tiny.clock().advance(std::chrono::seconds(1));
+    const auto leak = tiny.rig().truth();
+    ASSERT_TRUE(projector.show(patterns->lights[i].pattern, {}));
+    tiny.clock().advance(std::chrono::seconds(1));
+    const auto truth = tiny.rig().truth();
+    ASSERT_TRUE(truth);
+    const Illumination& measured = set->illuminations[i];
+    double worst = 0.0;
+    for (int y = 1; y < 7; ++y) {
+      for (int x = 1; x < 7; ++x) {
+        ASSERT_EQ(measured.mask.at(x, y), 1);
+        for (int c = 0; c < 3; ++c) {
+          const double real =
+              truth->surface_radiance.at(x, y, c) - leak->surface_radiance.at(x, y, c);
+          worst = std::max(worst, std::abs(measured.radiance.at(x, y, c) / real - 1.0));
+        }
+      }
+    }
+    EXPECT_LT(worst, 0.03) << measured.name;  // the hills bend by about 2 % within a cell
+  }
+}
+
+TEST_F(SequenceTest, GivesTheIrradianceThatTheProjectorSends) {
+  ASSERT_TRUE(run(dir_.path()));
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set);
+  support::TinyStation tiny(options_);
+  sim::SimProjector projector(tiny.rig());
+  ASSERT_TRUE(projector.open());
+  const auto patterns = make_patterns(task_.options.patterns,
+                                      task_.sample.block,
+                                      task_.sample.lit_face,
+                                      task_.calibration.projector);
+  for (std::size_t i = 0; i < patterns->lights.size(); ++i) {
+    ASSERT_TRUE(projector.show(patterns->lights[i].pattern, {}));
+    tiny.clock().advance(std::chrono::seconds(1));
+    const auto truth = tiny.rig().truth();
+    for (int patch = 0; patch < 16; ++patch) {  // of 2 x 2 cells
+      double mean = 0.0;
+      for (int k = 0; k < 4; ++k) {
+        mean += 0.25 * set->illuminations[i].irradiance.at(
+                           2 * (patch % 4) + k % 2, 2 * (patch / 4) + k / 2, 1);
+      }
+      const double leak = options_.projector.peak_irradiance[1] * options_.projector.black_level;
+      EXPECT_NEAR(mean, truth->patch_irradiance[patch][1], 1.001 * leak);
+    }
+  }
+}
+
+TEST_F(SequenceTest, GivesTheSameBytesEachTime) {
+  ASSERT_TRUE(run(dir_.path()));
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, TakesNothingAgainThatIsThere) {
+  ASSERT_TRUE(run(dir_.path()));
+  const auto again = run(dir_.path());
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->taken, 0);
+  EXPECT_EQ(exposures_, 0u);
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, StopsWhenAskedWithTheLampDark) {
+  std::stop_source stop;
+  stop.request_stop();
+  const auto summary = run(dir_.path(), stop.get_token());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kCancelled);
+  EXPECT_FALSE(lamp_on_);
+}
+
+TEST_F(SequenceTest, RetakesTheRegionOfAStaleFrame) {
+  expect_recovers_from({{sim::FaultKind::kStaleFrame, kFirstLight + 2, 1}}, "wrong_pattern");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfADuplicateFrame) {
+  expect_recovers_from({{sim::FaultKind::kDuplicateFrame, kFirstLight + 2, 1}}, "duplicate");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfATornFrame) {
+  expect_recovers_from({{sim::FaultKind::kTornFrame, kFirstLight + 1, 0}}, "torn");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfABlackFrame) {
+  expect_recovers_from({{sim::FaultKind::kBlackFrame, kFirstLight + 3, 0}}, "black");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfAMissingFrame) {
+  expect_recovers_from({{sim::FaultKind::kMissingFrame, kFirstLight, 1}}, "device");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfASkippedTrigger) {
+  expect_recovers_from({{sim::FaultKind::kSkippedTrigger, kFirstLight + 3, 1}}, "missing");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfATimeThatRanBackwards) {
+  expect_recovers_from({{sim::FaultKind::kTimeBackwards, kFirstLight + 3, 1}}, "out_of_order");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfAWrongExposure) {
+  expect_recovers_from({{sim::FaultKind::kWrongExposure, kFirstLight + 3, 1}}, "wrong_exposure");
+}
+TEST_F(SequenceTest, RetakesTheRegionOfAPatternThatStuck) {
+  expect_recovers_from({{sim::FaultKind::kPatternStuck, kFirstLight + 4}}, "wrong_pattern");
+}
+TEST_F(SequenceTest, ComesBackAfterALostCamera) {
+  expect_recovers_from({{sim::FaultKind::kCameraLost, kFirstLight + 1, 1}}, "device");
+}
+TEST_F(SequenceTest, ComesBackAfterALostProjector) {
+  expect_recovers_from({{sim::FaultKind::kProjectorLost, kFirstLight + 1}}, "device");
+}
+
+TEST_F(SequenceTest, GivesUpWhenTheRetriesAreUsedUpAndGoesOnLater) {
+  options_.faults = {{sim::FaultKind::kTornFrame, kFirstLight + 2, 0, 1000}};
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(summary.error().message, AllOf(HasSubstr("region_1_0"), HasSubstr("torn")));
+  EXPECT_FALSE(lamp_on_);
+  options_.faults = {};
+  const auto again = run(dir_.path());
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->taken, 9);
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, RetakesARegionWhoseFrameFileWasTruncatedAndNamesTheFile) {
+  ASSERT_TRUE(run(dir_.path()));
+  fs::path frame;
+  for (const auto& entry : fs::directory_iterator(dir_.path() / "frames" / "region_0_1")) {
+    if (entry.path().extension() == ".png") frame = entry.path();
+  }
+  fs::resize_file(frame, fs::file_size(frame) / 2);
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 1);
+  const auto damaged = events_->facts("region.damaged");
+  ASSERT_EQ(damaged.size(), 1u);
+  EXPECT_THAT(damaged[0]["message"].get<std::string>(), HasSubstr(frame.string()));
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, RetakesBlackFramesThatWereDamaged) {
+  ASSERT_TRUE(run(dir_.path()));
+  for (const auto& entry : fs::directory_iterator(dir_.path() / "frames" / "black")) {
+    if (entry.path().extension() == ".png") fs::remove(entry.path());
+  }
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 0);
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, SaysBeforehandThatTheDiskIsTooFullAndGoesOnOnceThereIsRoom) {
+  free_bytes_ = [](const fs::path&) -> Result<std::uint64_t> { return 100'000; };
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(summary.error().message,
+              AllOf(HasSubstr(dir_.path().string()), HasSubstr("bytes"), HasSubstr("100000")));
+  EXPECT_EQ(exposures_, 0u);
+  free_bytes_ = nullptr;
+  ASSERT_TRUE(run(dir_.path()));
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, MasksARegionThatIsBlackWhileTheLampWorks) {
+  options_.faults = {{sim::FaultKind::kBlackFrame, kFirstLight + 1, 0, 1000}};
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(summary->unusable, ElementsAre("region_0_1"));
+  const auto unusable = events_->facts("region.unusable");
+  ASSERT_EQ(unusable.size(), 1u);
+  EXPECT_THAT(unusable[0]["message"].get<std::string>(), HasSubstr("the lamp works"));
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set);
+  EXPECT_EQ(set->illuminations[1].mask, Image<std::uint8_t>(8, 8, 1, 0));
+}
+
+TEST_F(SequenceTest, StopsWhenTheLampIsDeadAndGoesOnAtThatRegion) {
+  options_.faults = {{sim::FaultKind::kBlackFrame, kFirstLight + 1, 0, 1000},
+                     {sim::FaultKind::kBlackFrame, kWhitePattern, 0, 1000}};
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(summary.error().message, AllOf(HasSubstr("region_0_1"), HasSubstr("lamp")));
+  options_.faults = {};
+  const auto again = run(dir_.path());
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->taken, 10);
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, StopsWhenTooManyRegionsAreSaturatedAndSaysWhatWouldHelp) {
+  options_.camera.sensitivity = {1e13, 1e13, 1e13};
+  task_ = support::tiny_task(options_);
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(summary.error().message,
+              AllOf(HasSubstr("3 of 4 regions"), HasSubstr("saturated"), HasSubstr("aperture")));
+  EXPECT_EQ(events_->facts("region.unusable").size(), 3u);
+}
+
+TEST_F(SequenceTest, RefusesOptionsThatMakeNoSense) {
+  task_.options.exposures.ratio = 0.8;
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(summary.error().message, "capture.exposures.ratio = 0.8; expected > 1 and at most 16");
+}
+
+TEST_F(SequenceTest, RefusesACameraThatIsNotTheCalibratedOne) {
+  task_.calibration.camera.model.width = 65;
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_THAT(summary.error().message, HasSubstr("64 x 64"));
+}
+
+TEST_F(SequenceTest, TellsHowFarItIs) {
+  ASSERT_TRUE(run(dir_.path()));
+  const auto all = events_->progresses();
+  ASSERT_FALSE(all.empty());
+  EXPECT_EQ(all.back().step, "capture");
+  EXPECT_GT(all.back().fraction, 0.9);
+  EXPECT_TRUE(all.back().seconds_left.has_value());
+  EXPECT_EQ(all.back().detail["total"], 11);
+  EXPECT_TRUE(std::ranges::is_sorted(all, {}, &Progress::fraction));
+}
+
+}  // namespace
+}  // namespace opaline::capture
