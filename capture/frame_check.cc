@@ -50,8 +50,8 @@ std::optional<FrameProblem> FrameCheck::check(const Frame& frame,
                                               std::uint64_t pattern_id,
                                               nanoseconds exposure) {
   auto found = find(frame, pattern_id, exposure);
-  before_ =
-      Before{frame.trigger_count, frame.start + frame.exposure, pattern_id, exposure, frame.sha256};
+  const auto count = found ? std::nullopt : std::optional(frame.trigger_count);
+  before_ = Before{count, frame.start + frame.exposure, pattern_id, exposure, frame.sha256};
   return found;
 }
 
@@ -99,10 +99,10 @@ std::optional<FrameProblem> FrameCheck::against_before(const Frame& frame,
   if (!same_request && frame.sha256 == before_->sha256 && !uniform(frame.pixels)) {
     return problem(FrameFault::kDuplicate, "the same pixels as the frame before");
   }
-  if (frame.trigger_count != before_->trigger_count + 1) {
+  if (before_->trigger_count && frame.trigger_count != *before_->trigger_count + 1) {
     return problem(
         FrameFault::kMissing,
-        fmt::format("trigger count {} after {}", frame.trigger_count, before_->trigger_count));
+        fmt::format("trigger count {} after {}", frame.trigger_count, *before_->trigger_count));
   }
   if (frame.start < before_->end) {
     return problem(FrameFault::kOutOfOrder,
