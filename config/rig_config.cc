@@ -7,10 +7,13 @@
 #include <cstdlib>
 #include <utility>
 
+#include "config/block_fields.h"
 
 namespace opaline::config {
 namespace {
 
+constexpr std::array<std::string_view, 5> kSceneNames{
+    "homogeneous", "layered", "wax", "marble", "stone"};
 constexpr std::array<std::string_view, 3> kResponseNames{"linear", "gamma", "table"};
 constexpr Range kAtLeast0 = Range{.min = 0.0};
 constexpr Range kAbove0 = Range{.min = 0.0, .min_excluded = true};
@@ -122,6 +125,19 @@ void visit_sim_projector(Fields& fields, sim::ProjectorOptics& p) {
                   Range::between(1e-6, 1));
 }
 
+void visit_scene(Fields& fields, sim::SceneOptions& scene) {
+  fields.one_of({"kind", "what the sample is made of"}, scene.kind, kSceneNames);
+  fields.whole({"seed", "of its pattern"}, scene.seed, kSeed);
+  visit_block(fields, scene.block);
+  fields.number({"ior", "relative refractive index"}, scene.ior, Range::between(1, 3));
+  fields.number(
+      {"reduced_scattering_per_mm", "of the ground, in green"}, scene.reduced_scattering, kAbove0);
+  fields.number({"absorption_per_mm", "of the ground, in green"}, scene.absorption, kAtLeast0);
+  fields.number(
+      {"contrast", "0: homogeneous, 1: as the kind has it"}, scene.contrast, Range::between(0, 2));
+  fields.length_mm({"feature_size", "of blobs and grains, distance of veins"}, scene.feature_mm);
+}
+
 void visit_path(Fields& fields, const Key& key, std::filesystem::path& path, bool must_exist) {
   fields.path(key, path);
   std::error_code ignored;
@@ -131,12 +147,25 @@ void visit_path(Fields& fields, const Key& key, std::filesystem::path& path, boo
 }
 
 void visit_transport(Fields& fields, SimConfig& sim, bool check_files) {
+  sim::ResponseOptions& t = sim.transport;
   visit_path(
       fields,
       {"responses", "stored light transport of this scene; none: computed (tens of minutes)"},
       sim.responses,
       check_files);
   fields.path({"cache", "directory for computed ones; empty: the user's cache"}, sim.cache);
+  visit_face(fields, {"lit_face", "where the projector's light enters"}, t.lit_face);
+  visit_face(fields, {"seen_face", "what the camera looks at"}, t.seen_face);
+  fields.flag({"diffuse_entry", "diffuse light instead of perpendicular"}, t.diffuse_entry);
+  std::array<int, 2> patches{t.patches_x, t.patches_y};
+  fields.wholes({"patches", "entry patches, columns and rows"}, patches, Range::between(1, 64));
+  t.patches_x = patches[0];
+  t.patches_y = patches[1];
+  fields.number(
+      {"anisotropy", "g of the phase function"}, t.anisotropy, Range::between(-0.95, 0.95));
+  fields.whole({"seed", "of the photons"}, t.seed, kSeed);
+  fields.whole({"photons_per_patch", "in each channel"}, t.photons_per_patch, Range::at_least(1));
+  t.camera_centre = sim.rig.camera.model.centre();
 }
 
 void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
@@ -147,6 +176,7 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
   fields.number({"time_factor", "how many times as fast as real time its clock runs"},
                 sim.rig.time_factor,
                 Range::between(1, 1000));
+  fields.table({"scene", "The sample."}, [&](Fields& f) { visit_scene(f, sim.scene); });
   fields.table({"camera", "What its camera does to the light."},
                [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });
   fields.table({"projector", "What its projector does with a picture."},

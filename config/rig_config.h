@@ -8,7 +8,9 @@
 #include "base/block.h"
 #include "capture/calibration.h"
 #include "config/fields.h"
+#include "sim/light_transport.h"
 #include "sim/rig_options.h"
+#include "sim/scene.h"
 
 namespace opaline::config {
 
@@ -31,6 +33,8 @@ struct SimConfig {
   RigPlace run = RigPlace::kInside;
   std::filesystem::path socket;  ///< of opaline-rig; empty: see rig_socket()
   sim::RigOptions rig;
+  sim::SceneOptions scene;
+  sim::ResponseOptions transport;   ///< its camera_centre follows from the camera's pose
   std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
   std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
 };

@@ -117,14 +117,35 @@ void visit_preview(Fields& fields, PreviewOptions& p) {
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
 }
 
+bool same_length(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(a, b); }
+
+/// What a simulated rig must agree on with the session's sample; reported where the sample stands.
+void visit_agreement(Fields& fields, const SessionConfig& session) {
+  if (!session.rig.is_simulated()) return;
+  const SimConfig& sim = session.rig.sim;
+  const Vec3 want = sim.scene.block.size();
+  const Vec3 have = session.sample.block.size();
+  fields.check(
+      same_length(want.x, have.x) && same_length(want.y, have.y) && same_length(want.z, have.z),
+      "size",
+      fmt::format("the simulated sample measures {} x {} x {} mm", want.x, want.y, want.z));
+  fields.check(sim.transport.lit_face == session.sample.lit_face,
+               "lit_face",
+               fmt::format("the simulated light enters by {}", to_string(sim.transport.lit_face)));
+  fields.check(sim.transport.seen_face == session.sample.seen_face,
+               "seen_face",
+               fmt::format("the simulated camera sees {}", to_string(sim.transport.seen_face)));
+}
+
 /// `rig_is_known`: session.rig has been read, and the two files must agree.
-void visit_session(Fields& fields, SessionConfig& session, bool /*rig_is_known*/) {
+void visit_session(Fields& fields, SessionConfig& session, bool rig_is_known) {
   fields.text({"name", "of the session, for people"}, session.name);
   std::string rig_file = session.rig_file.string();
   fields.text({"rig", "the rig file", true}, rig_file);
   session.rig_file = rig_file;
   fields.table({"sample", "What is measured."}, [&](Fields& f) {
     visit_sample(f, session);
+    if (rig_is_known) visit_agreement(f, session);
   });
   fields.table({"capture", "How it is captured."},
                [&](Fields& f) { visit_capture(f, session.capture); });

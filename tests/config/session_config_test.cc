@@ -71,6 +71,8 @@ TEST_F(SessionConfigTest, ReadsItsOwnResolvedFileBackToTheSameConfiguration) {
   const auto again = parse_resolved({"resolved.toml", resolved, {}});
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(to_toml(*again), resolved);
+  EXPECT_EQ(again->rig.sim.scene, session->rig.sim.scene);
+  EXPECT_EQ(again->rig.sim.transport, session->rig.sim.transport);
   EXPECT_EQ(again->rig.calibration.camera.model, session->rig.calibration.camera.model);
   EXPECT_EQ(again->capture.exposures.shortest, session->capture.exposures.shortest);
   EXPECT_TRUE(again->rig_file.is_absolute());
@@ -137,6 +139,14 @@ TEST_F(SessionConfigTest, NamesAMissingSessionFile) {
   ASSERT_FALSE(session);
   EXPECT_EQ(session.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(session.error().message, HasSubstr("nowhere.toml"));
+}
+
+TEST_F(SessionConfigTest, HoldsASimulatedSampleToTheOneThatIsSimulated) {
+  write("rig.toml", "");
+  EXPECT_THAT(
+      problems_of(write("session.toml",
+                        "rig = \"rig.toml\"\n[sample]\nsize = [\"24 mm\", \"24 mm\", \"8 mm\"]\n")),
+      ElementsAre("3:8: size: the simulated sample measures 24 x 24 x 6 mm"));
 }
 
 TEST_F(SessionConfigTest, MakesPathsAbsoluteAndRefusesRelativeOnesInTexts) {
