@@ -1,4 +1,4 @@
-#include "base/unix_socket.h"
+#include "daemon/jobs/unix_socket.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <system_error>
 
-namespace opaline {
+namespace opaline::daemon {
 namespace {
 
 constexpr int kBacklog = 8;
@@ -75,4 +75,4 @@ Result<FileDescriptor> connect_unix(const std::filesystem::path& path) {
   return fd;
 }
 
-}  // namespace opaline
+}  // namespace opaline::daemon

@@ -5,7 +5,7 @@
 #include "base/file_descriptor.h"
 #include "base/result.h"
 
-namespace opaline {
+namespace opaline::daemon {
 
 /// Unix stream sockets on paths of any length (the kernel's own limit is 107 bytes): the directory
 /// is opened first and named through /proc/self/fd.
@@ -17,4 +17,4 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path);
 /// Connects, blocking. Errors: kUnavailable when nobody listens there.
 Result<FileDescriptor> connect_unix(const std::filesystem::path& path);
 
-}  // namespace opaline
+}  // namespace opaline::daemon

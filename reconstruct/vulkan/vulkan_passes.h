@@ -1,0 +1,76 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "gpu/commands.h"
+#include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/vulkan/device_fields.h"
+#include "reconstruct/vulkan/kernels.h"
+
+namespace opaline::reconstruct::vulkan {
+
+/// The passes of diffusion/passes.h on a Vulkan device, for right-hand sides first to first + count of a batch.
+///
+/// Passes are recorded; update_norm() submits what was recorded since the last submission, one outer iteration, and
+/// reads the norms. Each right-hand side is scaled by the norm of its first residual, so that float32 sums of squares
+/// keep clear of underflow. When the device fails, norms are NaN, later passes do nothing, and error() says why.
+class VulkanPasses {
+ public:
+  /// What the device holds; all of it outlives the passes.
+  struct Device {
+    gpu::Context& context;
+    const Kernels& kernels;
+    const std::vector<diffusion::Level>& levels;  ///< on the host, in float64
+    const std::vector<DeviceLevel>& coefficients;
+    DeviceFields& fields;
+    gpu::Commands& commands;
+  };
+  VulkanPasses(const Device& device,
+               const diffusion::FieldBatch& b,
+               diffusion::FieldBatch& x,
+               int first,
+               int count);
+
+  int levels() const { return static_cast<int>(device_.levels.size()); }
+  std::span<const double> true_residual();
+  void smooth_restrict(int level);
+  void prolong_smooth(int level);
+  void apply_dot(bool restart);
+  std::span<const double> update_norm();
+
+  const std::optional<Error>& error() const { return error_; }
+  /// Runs what was recorded; the solver need not, tests look at fields between passes.
+  void finish();
+  /// A field of one right-hand side as it stands on the device, unscaled.
+  std::vector<double> read(const gpu::Buffer& field, int m);
+
+ private:
+  using Buffers = std::initializer_list<const gpu::Buffer*>;
+  void start();
+  void dispatch(const gpu::Pipeline& kernel,
+                Buffers buffers,
+                const GridPush& push,
+                std::size_t threads);
+  void reduce(Scalar scalar, std::int32_t partials);
+  GridPush push_for(int level, int color = 0) const;
+  std::size_t colored_threads(int level) const;
+  void fetch_correction();
+  void send_residual(const std::vector<std::vector<double>>& residuals);
+  void fail(const Error& error);
+  std::span<const double> not_a_number();
+
+  Device device_;
+  const diffusion::FieldBatch& b_;
+  diffusion::FieldBatch& x_;
+  int first_;
+  std::size_t cells_;
+  std::vector<double> scale_;
+  std::vector<double> norms_;
+  bool recording_ = false;
+  bool corrected_ = false;  // d may differ from zero
+  std::optional<Error> error_;
+};
+
+}  // namespace opaline::reconstruct::vulkan
