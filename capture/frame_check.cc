@@ -50,8 +50,12 @@ std::optional<FrameProblem> FrameCheck::check(const Frame& frame,
                                               std::uint64_t pattern_id,
                                               nanoseconds exposure) {
   auto found = find(frame, pattern_id, exposure);
-  const auto count = found ? std::nullopt : std::optional(frame.trigger_count);
-  before_ = Before{count, frame.start + frame.exposure, pattern_id, exposure, frame.sha256};
+  if (found && before_) {
+    before_->trigger_count.reset();
+  } else if (!found) {
+    before_ = Before{
+        frame.trigger_count, frame.start + frame.exposure, pattern_id, exposure, frame.sha256};
+  }
   return found;
 }
 

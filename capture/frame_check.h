@@ -36,8 +36,8 @@ struct FrameProblem {
 class FrameCheck {
  public:
   explicit FrameCheck(drivers::CameraInfo camera) : camera_(std::move(camera)) {}
-  /// None when the frame is what was asked for. Good or bad, it becomes the frame before the next,
-  /// but after a bad one it is not known where the camera's count stands.
+  /// None when the frame is what was asked for: it becomes the frame before the next. After a bad one
+  /// it is not known where the camera's count stands.
   std::optional<FrameProblem> check(const Frame& frame,
                                     std::uint64_t pattern_id,
                                     std::chrono::nanoseconds exposure);

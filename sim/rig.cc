@@ -14,6 +14,8 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::size_t kRenderedKept = 16;
+/// An exposure whose caller has gone away may still be on its way out when the next one is asked for.
+constexpr std::chrono::milliseconds kExposureEnds{500};
 constexpr nanoseconds kSlowLight = std::chrono::seconds(1);
 
 double seconds(nanoseconds duration) { return std::chrono::duration<double>(duration).count(); }
@@ -190,7 +192,9 @@ Result<void> Rig::show(std::uint64_t session,
   return ok();
 }
 
-Result<Rig::Exposure> Rig::trigger(std::uint64_t session, nanoseconds requested) {
+Result<Rig::Exposure> Rig::trigger(std::uint64_t session,
+                                   nanoseconds requested,
+                                   const std::stop_token& stop) {
   const CameraOptics& camera = options_.camera;
   if (requested < camera.shortest_exposure || requested > camera.longest_exposure) {
     return invalid_argument(fmt::format("exposure of {} s; expected {} to {} s",
@@ -198,9 +202,13 @@ Result<Rig::Exposure> Rig::trigger(std::uint64_t session, nanoseconds requested)
                                         seconds(camera.shortest_exposure),
                                         seconds(camera.longest_exposure)));
   }
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
+  const auto free = [&] { return exposing_session_ != session; };
+  if (!exposure_over_.wait_for(lock, stop, kExposureEnds, free)) {
+    return stop.stop_requested() ? cancelled("exposure: stopped")
+                                 : busy("simulated camera: exposing");
+  }
   if (session == 0 || session != camera_session_) return unavailable("simulated camera: not open");
-  if (exposing_session_ == session) return busy("simulated camera: exposing");
 
   Exposure e{.session = session, .start = clock_.now(), .requested = requested};
   const Shown shown = timeline_.at(e.start);
@@ -219,7 +227,7 @@ Result<Rig::Exposure> Rig::trigger(std::uint64_t session, nanoseconds requested)
 
 Result<Frame> Rig::expose(std::uint64_t session, nanoseconds exposure, std::stop_token stop) {
   if (stop.stop_requested()) return cancelled("exposure: stopped");
-  const Result<Exposure> triggered = trigger(session, exposure);
+  const Result<Exposure> triggered = trigger(session, exposure, stop);
   if (!triggered) return triggered.error();
   Result<Frame> frame = [&]() -> Result<Frame> {
     if (triggered->camera_lost > 0 || triggered->missing) return fail_later(*triggered, stop);
@@ -228,6 +236,7 @@ Result<Frame> Rig::expose(std::uint64_t session, nanoseconds exposure, std::stop
   }();
   const std::lock_guard lock(mutex_);
   if (exposing_session_ == session) exposing_session_ = 0;
+  exposure_over_.notify_all();
   return frame;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -58,7 +59,9 @@ class Rig : public RigPort {
   Rig(const RigOptions& options, std::shared_ptr<const TransportResponses> responses, Clock* clock);
 
   struct Exposure;
-  Result<Exposure> trigger(std::uint64_t session, std::chrono::nanoseconds exposure);
+  Result<Exposure> trigger(std::uint64_t session,
+                           std::chrono::nanoseconds exposure,
+                           const std::stop_token& stop);
   Result<Frame> finish(Exposure exposure);
   Result<Frame> fail_later(const Exposure& exposure, std::stop_token stop);
   Image<std::uint16_t> picture(const Exposure& exposure,
@@ -74,6 +77,7 @@ class Rig : public RigPort {
   const Sensor sensor_;
 
   mutable std::mutex mutex_;  // guards all below
+  std::condition_variable_any exposure_over_;
   LightTimeline timeline_;
   FaultPlan plan_;
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const StationLight>>>

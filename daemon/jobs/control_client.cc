@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <string>
 
-#include "daemon/jobs/unix_socket.h"
+#include "base/unix_socket.h"
 
 namespace opaline::daemon {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/log.h"
-#include "daemon/jobs/unix_socket.h"
+#include "base/unix_socket.h"
 
 namespace opaline::daemon {
 namespace {

@@ -1,0 +1,156 @@
+#include "sim/rig_server.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "base/log.h"
+#include "base/unix_socket.h"
+#include "sim/rig_codec.h"
+
+namespace opaline::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+constexpr std::size_t kConnections = 32;
+constexpr std::chrono::seconds kRequestPatience{
+    5};  ///< for a client to send or take a whole message
+
+/// Requests a stop when the peer of a socket hangs up, or when an outer stop is requested.
+class HangUpWatch {
+ public:
+  HangUpWatch(int socket, std::stop_token outer)
+      : forward_(std::move(outer), [this] { gone_.request_stop(); }),
+        thread_([this, socket](std::stop_token done) {
+          const auto hung_up = wait_for(socket, POLLRDHUP, Deadline::max(), std::move(done));
+          if (hung_up) gone_.request_stop();
+        }) {}
+  std::stop_token token() const { return gone_.get_token(); }
+
+ private:
+  std::stop_source gone_;
+  std::stop_callback<std::function<void()>> forward_;
+  std::jthread thread_;  // last: joins first
+};
+
+RigMessage reply_to(const Result<void>& done) { return done ? RigMessage{} : encode(done.error()); }
+
+template <class T>
+RigMessage reply_to(const Result<T>& value) {
+  return value ? encode(*value) : encode(value.error());
+}
+
+std::uint64_t session_of(const RigMessage& request) { return request.header.at("session"); }
+
+RigMessage show(RigPort& rig, const RigMessage& request, const std::stop_token& stop) {
+  const auto pattern = decode_pattern(request);
+  return pattern ? reply_to(rig.show(session_of(request), *pattern, stop))
+                 : encode(pattern.error());
+}
+
+RigMessage arm(RigPort& rig, const RigMessage& request) {
+  const auto faults = decode_faults(request);
+  return faults ? reply_to(rig.arm(*faults)) : encode(faults.error());
+}
+
+/// Does what a request asks for. May throw what the JSON library throws.
+RigMessage perform(RigPort& rig, const RigMessage& request, const std::stop_token& stop) {
+  const std::string what = request.header.at("do");
+  if (what == "open_camera") return reply_to(rig.open_camera());
+  if (what == "open_projector") return reply_to(rig.open_projector());
+  if (what == "expose") {
+    const std::chrono::nanoseconds exposure(request.header.at("exposure_ns").get<std::int64_t>());
+    return reply_to(rig.expose(session_of(request), exposure, stop));
+  }
+  if (what == "show") return show(rig, request, stop);
+  if (what == "close_camera") return rig.close_camera(session_of(request)), RigMessage{};
+  if (what == "close_projector") return rig.close_projector(session_of(request)), RigMessage{};
+  if (what == "dark") return reply_to(rig.dark());
+  if (what == "status") return reply_to(rig.status());
+  if (what == "truth") return reply_to(rig.truth());
+  if (what == "arm") return arm(rig, request);
+  return encode(invalid_argument(fmt::format("no request \"{}\"", what)));
+}
+
+Deadline soon() { return std::chrono::steady_clock::now() + kRequestPatience; }
+
+}  // namespace
+
+Result<std::unique_ptr<RigServer>> RigServer::create(RigPort& rig,
+                                                     const std::filesystem::path& socket) {
+  std::filesystem::path lock_path = socket;
+  lock_path += ".lock";
+  auto lock = FileLock::acquire(lock_path);
+  if (!lock) return lock.error().in(fmt::format("serve a rig at {}", socket.string()));
+  auto listener = listen_unix(socket);
+  if (!listener) return listener.error();
+  return std::unique_ptr<RigServer>(
+      new RigServer(rig, socket, *std::move(lock), *std::move(listener)));
+}
+
+RigServer::~RigServer() {
+  connections_.clear();
+  std::error_code ignored;
+  std::filesystem::remove(socket_, ignored);
+}
+
+Result<void> RigServer::serve(std::chrono::nanoseconds idle, std::stop_token stop) {
+  while (!idle_for(idle)) {
+    const auto ready =
+        wait_for(listener_.get(), POLLIN, std::chrono::steady_clock::now() + 500ms, stop);
+    if (ready) accept_one();
+    if (!ready && ready.error().code == ErrorCode::kCancelled) break;
+    if (!ready && ready.error().code != ErrorCode::kTimeout) return ready.error();
+    connections_.remove_if([](const Connection& connection) { return connection.over.load(); });
+  }
+  connections_.clear();
+  return ok();
+}
+
+void RigServer::accept_one() {
+  FileDescriptor socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket) return;
+  last_request_ = std::chrono::steady_clock::now();
+  if (connections_.size() >= kConnections) {
+    log::warning("simulated rig: {} clients at once, one refused", connections_.size());
+    return;
+  }
+  Connection& connection = connections_.emplace_back();
+  connection.thread =
+      std::jthread([this, &connection, socket = std::move(socket)](std::stop_token stop) {
+        answer(socket.get(), std::move(stop));
+        connection.over = true;
+      });
+}
+
+void RigServer::answer(int connection, std::stop_token stop) {
+  const auto request = receive_message(connection, soon(), stop);
+  if (!request) return log::debug("simulated rig: {}", request.error().message);
+  RigMessage reply;
+  try {
+    const HangUpWatch watch(connection, stop);
+    reply = perform(rig_, *request, watch.token());
+  } catch (const json::exception& wrong) {
+    reply = encode(invalid_argument(fmt::format("malformed request: {}", wrong.what())));
+  }
+  const auto sent = send_message(connection, reply, soon(), stop);
+  if (!sent) log::debug("simulated rig: {}", sent.error().message);
+}
+
+bool RigServer::idle_for(std::chrono::nanoseconds idle) {
+  if (!connections_.empty() || std::chrono::steady_clock::now() - last_request_ < idle)
+    return false;
+  const auto status = rig_.status();
+  return status && !status->lamp_on;
+}
+
+}  // namespace opaline::sim
