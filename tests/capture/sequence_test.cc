@@ -7,6 +7,7 @@
 
 #include "base/io/dataset_io.h"
 #include "capture/patterns.h"
+#include "tests/support/recording_files.h"
 #include "tests/support/simulated_station.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/tiny_capture.h"
@@ -37,7 +38,7 @@ class SequenceTest : public ::testing::Test {
   Result<CaptureSummary> run(const fs::path& directory, std::stop_token stop = {}) {
     support::TinyStation tiny(options_);
     events_ = std::make_unique<support::RecordingSink>();
-    const Workplace workplace{directory, system_files(), *events_, free_bytes_};
+    const Workplace workplace{directory, support::unsynced_files(), *events_, free_bytes_};
     auto summary = capture_session(task_, tiny.station(), workplace, stop);
     lamp_on_ = tiny.rig().status()->lamp_on;
     exposures_ = tiny.rig().status()->exposures;
@@ -50,8 +51,8 @@ class SequenceTest : public ::testing::Test {
       support::TinyStation tiny(support::tiny_rig());
       NullSink events;
       const auto task = support::tiny_task(support::tiny_rig());
-      const auto done =
-          capture_session(task, tiny.station(), {dir.path(), system_files(), events}, {});
+      const auto done = capture_session(
+          task, tiny.station(), {dir.path(), support::unsynced_files(), events}, {});
       EXPECT_TRUE(done) << done.error().message;
       return results_of(dir.path());
     }();
