@@ -35,16 +35,17 @@ namespace opaline::reconstruct::diffusion {
 ///                       anyone reads it). On level 0 also: rho_before = rho, rho = r . z.
 /// apply_dot(restart)    beta = rho / rho_before (0 when restart, or where rho_before is not > 0);
 ///                       p = z + beta p, q = K p, gamma = p . q.
-/// update_norm()         alpha = rho / gamma (0 where gamma is not > 0); d += alpha p, r -= alpha
-/// q.
+/// update_norm()         alpha = rho / gamma (0 where gamma is not > 0); d += alpha p,
+///                       r -= alpha q.
 ///                       Returns ||r||^2 of every right-hand side: the only read of an iteration.
 ///
 /// In single precision q = c p + sum g (p_i - p_j) with c = D - sum g, differences first: D p - sum g p loses as many
 /// digits as K is ill-conditioned, and conjugate gradients then need half as many iterations again.
 ///
 /// A back end may delay d += alpha p up to the next apply_dot or true_residual, and may scale each
-/// right-hand side by a constant of its own, as long as the norms it returns are of the unscaled
-/// fields. The spans live until the next pass.
+/// right-hand side by a constant of its own and K by another (||b|| = 1 and D <= 1 keep single precision
+/// in its range), as long as the norms it returns are of the unscaled fields. The spans live until the
+/// next pass.
 template <class P>
 concept DiffusionPasses = requires(P passes, int level, bool restart) {
   { passes.levels() } -> std::convertible_to<int>;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
 
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/host/flush_denormals.h"
 #include "reconstruct/host/host_grid.h"
 #include "reconstruct/host/row_kernels.h"
 #include "reconstruct/host/thread_team.h"
@@ -19,6 +21,7 @@ struct Group {
   int first = 0;
   int count = 1;
   std::span<const double> b_norms;  ///< ||b||^2 of the group's fields
+  bool x_is_zero = false;           ///< where that is known; it saves the first product
 };
 
 /// The passes of diffusion/passes.h for the processor. Each is one wave over the planes: while a
@@ -55,23 +58,37 @@ class HostPasses {
 
   template <class F>
   void for_slabs(int parts, int planes, const F& f);
-  template <class F>
-  void for_rows(int level, const F& f) const;
+  /// The rows of the next level that a line belongs to: its own and those beside, which may not exist.
+  struct Parents {
+    int j;
+    int j_side;
+    int k;
+    int k_side;
+    bool has_inner;
+    bool has_outer;
+  };
+
   Stencil stencil(int level, const Planes& u, int j, int k) const;
   const float* row_or_zeros(const float* plane, const HostField& field, int j) const;
 
-  void scale_plane(int level, float* z, int k);
-  void sweep_plane(int level, float* z, const Planes& u, int k, int colour);
+  Parents parents(int level, int j, int k) const;
+  Weights weights(int level, int j, int k) const;
+
+  void scale_row(int level, float* z, int j, int k);
+  void sweep_row(int level, float* z, const Planes& u, int j, int k, int colour);
   void restrict_slab(int level, Slab coarse);
-  void restrict_plane(int level, const Planes& u, int k, Slab coarse);
+  void restrict_row(int level, const Planes& u, int j, int k, Slab coarse);
   void prolong_slab(int level, Slab slab);
-  void prolong_plane(int level, float* z, int k);
-  void dot_plane(const float* z, int k);
+  void prolong_row(int level, float* z, int j, int k);
   void combine_halo(Slab slab);
   void apply_slab(Slab slab, Direction mode);
   void add_correction(Slab slab);
   void residual_slab(Slab slab);
-  void residual_row(int j, int k, double* line, double* sums);
+  void add_to_line(
+      const float* d, double d_factor, const float* p, double p_factor, double* x) const;
+  double copy_line(int m, int j, int k, std::vector<double>& line) const;
+  double residual_line(int m, int j, int k, std::vector<double>& line) const;
+  double* sums(int plane);
   void clear_sums(int plane);
   void total(std::vector<double>& sums) const;
 
@@ -88,5 +105,20 @@ class HostPasses {
   std::vector<double> scale_;  ///< 1 / ||b||
   std::vector<double> rho_, rho_before_, gamma_, norms_;
 };
+
+template <class F>
+void HostPasses::for_slabs(int parts, int planes, const F& f) {
+  parts = std::min(parts, planes);
+  const auto work = [&](int thread) {
+    if (thread >= parts) return;
+    const FlushDenormals flush;
+    f(Slab{thread, planes * thread / parts, planes * (thread + 1) / parts});
+  };
+  if (parts == 1) {
+    work(0);
+  } else {
+    team_.run(work);
+  }
+}
 
 }  // namespace opaline::reconstruct::host

@@ -60,10 +60,12 @@ class HostSolver final : public diffusion::FluenceSolver {
     if (Result<void> good = validate(options); !good) return good.error();
     if (Result<void> good = check_fields(block_, b, phi); !good) return good.error();
     const std::vector<double> norms = diffusion::norms_and_trivial(b, phi);
+    const bool dark =
+        std::all_of(phi.values.begin(), phi.values.end(), [](double v) { return v == 0.0; });
     SolveSummary all{Termination::kConverged, 0, 0.0, "no right-hand side"};
     for (int first = 0; first < b.count; first += kWidths.back()) {
       const int count = std::min(kWidths.back(), b.count - first);
-      const Group group{b, phi, first, count, std::span(norms).subspan(first, count)};
+      const Group group{b, phi, first, count, std::span(norms).subspan(first, count), dark};
       const SolveSummary summary = solve_group(group, options, stop);
       if (summary.termination == Termination::kCancelled) return cancelled(summary.message);
       merge(all, summary);

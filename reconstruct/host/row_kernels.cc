@@ -4,12 +4,16 @@
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reconstruct/host/row_kernels.cc"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace opaline::reconstruct::host::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+/// Cells between what is read and what is asked for: the processor does not foresee every other cell of a row.
+constexpr std::ptrdiff_t kAhead = 16;
 
 /// The right-hand sides of one cell: W floats in kCount registers.
 template <int W>
@@ -101,6 +105,7 @@ struct Kernels {
 
   static void scale(float* z, const float* r, const float* inverse, int first, int nx) {
     for (int i = first; i < nx; i += 2) {
+      hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
       a.store(z + i * W);
@@ -119,6 +124,7 @@ struct Kernels {
     for (int i = first; i < nx; i += 2) {
       const int up = i / w.ratio_x;
       const int beside = i % 2 == 1 ? up + 1 : up - 1;
+      hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
       a.add(w.own[i], above + up * W);
@@ -132,6 +138,7 @@ struct Kernels {
   static void sweep(
       float* z, const float* r, const float* inverse, const Stencil& s, int first, int nx) {
     for (int i = first; i < nx; i += 2) {
+      hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       add_neighbours<W>(a, s, i);
       a.scale(inverse[i]);
@@ -239,7 +246,7 @@ const char* target_name() { return hwy::TargetName(HWY_TARGET); }
 
 /// Cells i ... i + Lanes(d) of a residual, all of which have neighbours along x.
 template <class D>
-HWY_INLINE void store_residual(D d, const LineResidual& l, int i, double* r) {
+HWY_INLINE hn::Vec<D> store_residual(D d, const LineResidual& l, int i, double* r) {
   auto a =
       hn::NegMulAdd(hn::LoadU(d, l.diagonal + i), hn::LoadU(d, l.x + i), hn::LoadU(d, l.b + i));
   a = hn::MulAdd(hn::LoadU(d, l.gx + i - 1), hn::LoadU(d, l.x + i - 1), a);
@@ -253,6 +260,7 @@ HWY_INLINE void store_residual(D d, const LineResidual& l, int i, double* r) {
   if (l.outer_after != nullptr)
     a = hn::MulAdd(hn::LoadU(d, l.go_after + i), hn::LoadU(d, l.outer_after + i), a);
   hn::StoreU(a, d, r + i);
+  return a;
 }
 
 double residual_at_end(const LineResidual& l, int i, int nx) {
@@ -266,13 +274,22 @@ double residual_at_end(const LineResidual& l, int i, int nx) {
   return a;
 }
 
-void line(const LineResidual& l, double* r, int nx) {
+double line(const LineResidual& l, double* r, int nx) {
   const hn::ScalableTag<double> d;
   const auto step = static_cast<int>(hn::Lanes(d));
   r[0] = residual_at_end(l, 0, nx);
+  double ends = r[0] * r[0];
+  auto sum = hn::Zero(d);
   int i = 1;
-  for (; i + step < nx; i += step) store_residual(d, l, i, r);
-  for (; i < nx; ++i) r[i] = residual_at_end(l, i, nx);
+  for (; i + step < nx; i += step) {
+    const auto a = store_residual(d, l, i, r);
+    sum = hn::MulAdd(a, a, sum);
+  }
+  for (; i < nx; ++i) {
+    r[i] = residual_at_end(l, i, nx);
+    ends += r[i] * r[i];
+  }
+  return ends + hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE
@@ -286,8 +303,8 @@ HWY_EXPORT(line);
 
 RowKernels row_kernels(int width) { return HWY_DYNAMIC_DISPATCH(table)(width); }
 const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
-void line_residual(const LineResidual& l, double* r, int nx) {
-  HWY_DYNAMIC_DISPATCH(line)(l, r, nx);
+double line_residual(const LineResidual& l, double* r, int nx) {
+  return HWY_DYNAMIC_DISPATCH(line)(l, r, nx);
 }
 
 }  // namespace opaline::reconstruct::host

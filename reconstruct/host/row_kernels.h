@@ -89,7 +89,7 @@ RowKernels row_kernels(int width);
 /// "AVX2", as Highway names it.
 const char* instruction_set();
 
-/// One line of one field in float64, for r = b - K x; rows of x outside the grid are null.
+/// One line of one field in float64; rows of x outside the grid are null.
 struct LineResidual {
   const double* b;
   const double* x;
@@ -104,6 +104,7 @@ struct LineResidual {
   const double* go_before;
   const double* go_after;
 };
-void line_residual(const LineResidual& line, double* r, int nx);
+/// r = b - K x along the line; returns r . r.
+double line_residual(const LineResidual& line, double* r, int nx);
 
 }  // namespace opaline::reconstruct::host

@@ -1,0 +1,87 @@
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/Sparse>
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "bench/forward/forward_case.h"
+
+namespace opaline::bench {
+namespace {
+
+using reconstruct::diffusion::FieldBatch;
+using reconstruct::diffusion::Medium;
+using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// docs/physics.md, "Discretisation on a block sample", cell by cell.
+Matrix assemble(const Medium& medium) {
+  const Block& block = medium.block;
+  const auto n = static_cast<Eigen::Index>(block.cell_count());
+  Matrix matrix(n, n);
+  matrix.reserve(Eigen::VectorXi::Constant(n, 7));
+  for (std::size_t cell = 0; cell < block.cell_count(); ++cell) {
+    const auto nx = static_cast<std::size_t>(block.nx);
+    const auto ny = static_cast<std::size_t>(block.ny);
+    const std::array<std::size_t, 3> at{cell % nx, cell / nx % ny, cell / (nx * ny)};
+    const std::array<std::size_t, 3> stride{1, nx, nx * ny};
+    double diagonal = block.cell_volume() * medium.absorption[cell];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double h = block.spacing()[axis];
+      const double area = block.cell_volume() / h;
+      const double wall = area / (2.0 * medium.boundary_a + h / (2.0 * medium.diffusion[cell]));
+      const auto link = [&](std::size_t other) {
+        const double sum = medium.diffusion[cell] + medium.diffusion[other];
+        const double g = area / h * 2.0 * medium.diffusion[cell] * medium.diffusion[other] / sum;
+        matrix.insert(static_cast<Eigen::Index>(cell), static_cast<Eigen::Index>(other)) = -g;
+        diagonal += g;
+      };
+      if (at[axis] == 0)
+        diagonal += wall;
+      else
+        link(cell - stride[axis]);
+      if (at[axis] + 1 == static_cast<std::size_t>(block.cells()[axis]))
+        diagonal += wall;
+      else
+        link(cell + stride[axis]);
+    }
+    matrix.insert(static_cast<Eigen::Index>(cell), static_cast<Eigen::Index>(cell)) = diagonal;
+  }
+  matrix.makeCompressed();
+  return matrix;
+}
+
+}  // namespace
+
+double relative_residual(const ForwardCase& problem, const FieldBatch& x) {
+  const Matrix matrix = assemble(problem.medium);
+  const auto n = static_cast<Eigen::Index>(x.cells);
+  double worst = 0.0;
+  for (int m = 0; m < x.count; ++m) {
+    const Eigen::Map<const Eigen::VectorXd> b(problem.b.field(m), n);
+    const Eigen::VectorXd r = b - matrix * Eigen::Map<const Eigen::VectorXd>(x.field(m), n);
+    worst = std::max(worst, r.norm() / b.norm());
+  }
+  return worst;
+}
+
+EigenRun run_eigen_cg(const ForwardCase& problem, double tolerance, int rounds) {
+  const Matrix matrix = assemble(problem.medium);
+  const auto n = static_cast<Eigen::Index>(problem.b.cells);
+  FieldBatch x(problem.b.cells, problem.b.count);
+  std::vector<double> seconds;
+  for (int round = 0; round < rounds; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    Eigen::ConjugateGradient<Matrix, Eigen::Lower | Eigen::Upper> solver;
+    solver.setTolerance(tolerance);
+    solver.compute(matrix);
+    for (int m = 0; m < problem.b.count; ++m)
+      Eigen::Map<Eigen::VectorXd>(x.field(m), n) =
+          solver.solve(Eigen::Map<const Eigen::VectorXd>(problem.b.field(m), n));
+    seconds.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(seconds.begin(), seconds.begin() + rounds / 2, seconds.end());
+  return {seconds[rounds / 2], relative_residual(problem, x)};
+}
+
+}  // namespace opaline::bench
