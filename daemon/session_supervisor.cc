@@ -53,6 +53,9 @@ Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
   }
   if (is_over(decision->state)) cancel_wanted_ = cancel_sent_ = false;
   SessionSnapshot snapshot = make_snapshot(session_, history_, *decision);
+  if (decision->action == Action::kStart && child_ != nullptr) {
+    snapshot.state = SessionState::kRunning;
+  }
   if (waiting_) {
     snapshot.state = SessionState::kWaiting;
     snapshot.message = "the station is in use by another session";

@@ -1,0 +1,54 @@
+#include <atomic>
+#include <csignal>
+#include <stop_token>
+
+#include "daemon/cli/run.h"
+#include "daemon/cli/terminal.h"
+#include "daemon/event_follower.h"
+#include "daemon/executor.h"
+#include "daemon/jobs/stop_signals.h"
+#include "daemon/session_supervisor.h"
+
+namespace opaline::daemon {
+namespace {
+
+constexpr std::chrono::milliseconds kPeriod{100};
+
+void show_new(EventFollower& log, ProgressView& view) {
+  const auto events = log.poll();
+  if (!events) return;  // the supervisor says so
+  for (const Event& event : *events) view.on_event(event.type, event.data);
+}
+
+}  // namespace
+
+Result<Ending> run_locally(const SessionDirectory& session,
+                           const std::filesystem::path& programs,
+                           const std::filesystem::path& station_lock) {
+  LocalExecutor executor(programs);
+  const SystemClock clock;
+  ProgressView view(terminal_options(), clock);
+  EventFollower log(session.events());
+  SessionSupervisor supervisor(session, station_lock, {executor, system_files(), clock});
+  std::atomic<bool> cancel = false;
+  std::stop_source leave;
+  auto signals = StopSignals::watch([&](int signal) {
+    if (signal == SIGTERM || cancel.exchange(true)) leave.request_stop();
+  });
+  if (!signals) return signals.error();
+  SessionState told = SessionState::kQueued;
+  for (SystemClock pause;; pause.sleep(kPeriod, leave.get_token())) {
+    if (cancel) supervisor.cancel();
+    BusyStations stations;
+    const Result<SessionSnapshot> snapshot = supervisor.step(stations);
+    if (!snapshot) return snapshot.error();
+    show_new(log, view);
+    if (snapshot->state != told) view.on_state(to_json(*snapshot));
+    told = snapshot->state;
+    if (is_over(told) || leave.stop_requested()) {
+      return Ending{snapshot->id, session.path(), std::string(to_string(told)), snapshot->message};
+    }
+  }
+}
+
+}  // namespace opaline::daemon

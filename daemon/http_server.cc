@@ -1,0 +1,389 @@
+#include "daemon/http_server.h"
+
+#include <unistd.h>
+
+#include <utility>  // Boost 1.74's awaitable.hpp needs it before
+
+#include <array>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/basic_stream.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http.hpp>
+#include <csignal>
+#include <exception>
+
+#include "base/log.h"
+#include "base/unix_socket.h"
+#include "daemon/http_access.h"
+#include "daemon/problem.h"
+#include "daemon/router.h"
+
+namespace opaline::daemon {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using boost::system::error_code;
+using Tcp = net::ip::tcp;
+using Local = net::local::stream_protocol;
+using Generic = net::generic::stream_protocol;
+using Stream = beast::basic_stream<Generic>;
+
+constexpr std::uint32_t kHeaderLimit = 8u << 10;
+constexpr std::uint64_t kBodyLimit = 1u << 20;
+constexpr std::size_t kFileChunk = 64u << 10;
+constexpr std::size_t kBusyStream = 32u << 10;
+constexpr std::chrono::milliseconds kStreamPeriod{100};
+constexpr int kPeriodsPerHeartbeat = 50;
+constexpr std::chrono::seconds kLingerDeadline{2};
+constexpr std::size_t kLingerLimit = 4u << 20;
+
+auto into(error_code& error) { return net::redirect_error(net::use_awaitable, error); }
+
+/// Counts while it lives.
+class Counted {
+ public:
+  explicit Counted(std::size_t& count) : count_(count) { ++count_; }
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+ private:
+  std::size_t& count_;
+};
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return result;
+}
+
+std::string_view view(boost::string_view text) { return {text.data(), text.size()}; }
+
+// Nothing when the target is no path.
+std::optional<HttpRequest> plain(const http::request<http::string_body>& from, bool same_user) {
+  HttpRequest request;
+  const std::string_view target = view(from.target());
+  const std::size_t mark = target.find('?');
+  auto path = split_path(target.substr(0, mark));
+  if (!path) return std::nullopt;
+  request.path = *std::move(path);
+  if (mark != std::string_view::npos) request.query = split_query(target.substr(mark + 1));
+  request.method = std::string(view(from.method_string()));
+  for (const auto& field : from) {
+    request.headers[lower(view(field.name_string()))] = std::string(view(field.value()));
+  }
+  request.body = from.body();
+  request.same_user = same_user;
+  return request;
+}
+
+HttpResponse response_to(error_code error) {
+  if (error == http::error::body_limit) {
+    return problem(413, "too_large", "a body has at most 1 MiB");
+  }
+  if (error == http::error::header_limit || error == http::error::buffer_overflow) {
+    return problem(431, "too_large", "a header has at most 8 KiB");
+  }
+  if (error == beast::error::timeout) {
+    return problem(408, "timeout", "the request did not come in time");
+  }
+  return problem(400, "invalid_argument", "not an HTTP/1.1 request: " + error.message());
+}
+
+// Whether anybody is there to be told.
+bool is_gone(error_code error) {
+  return error == http::error::end_of_stream || error == net::error::eof ||
+         error == net::error::connection_reset || error == net::error::operation_aborted;
+}
+
+}  // namespace
+
+struct HttpServer::Impl {
+  Impl(Options given, Handler given_handler)
+      : options(std::move(given)), handler(std::move(given_handler)) {}
+
+  Result<void> listen_tcp();
+  Result<void> listen_local();
+  template <class Acceptor>
+  net::awaitable<void> accept_from(Acceptor& acceptor, bool same_user);
+  net::awaitable<void> serve(Stream stream, bool same_user);
+  net::awaitable<bool> serve_one(Stream& stream, beast::flat_buffer& buffer, bool same_user);
+  HttpResponse handle(const http::request<http::string_body>& message, bool same_user);
+  net::awaitable<void> write(Stream& stream, HttpResponse& response, bool keep_alive);
+  net::awaitable<void> write_file(Stream& stream, OpenArtefact& file, error_code& error);
+  net::awaitable<void> write_stream(Stream& stream, TextStream& text, error_code& error);
+  net::awaitable<void> write_chunk(Stream& stream, const std::string& text, error_code& error);
+  net::awaitable<void> linger(Stream& stream);
+  template <class Body>
+  void fill_head(http::response<Body>& head, const HttpResponse& response, bool keep_alive) const;
+
+  Options options;
+  Handler handler;
+  std::size_t connections = 0;
+  std::size_t streams = 0;
+  net::io_context context{1};  // destroys the connections, which count themselves above
+  Tcp::acceptor tcp{context};
+  Local::acceptor local{context};
+};
+
+Result<void> HttpServer::Impl::listen_tcp() {
+  error_code error;
+  const auto address = net::ip::make_address(options.address, error);
+  if (error) return invalid_argument("\"" + options.address + "\" is not an IP address");
+  if (!address.is_loopback() && options.token.empty()) {
+    return invalid_argument(options.address +
+                            " is open to others: give a token file, or listen on 127.0.0.1");
+  }
+  const Tcp::endpoint endpoint(address, options.port);
+  tcp.open(endpoint.protocol(), error);
+  if (!error) tcp.set_option(Tcp::acceptor::reuse_address(true), error);
+  if (!error) tcp.bind(endpoint, error);
+  if (!error) tcp.listen(net::socket_base::max_listen_connections, error);
+  const std::string where = fmt::format("{}:{}", options.address, options.port);
+  if (error == net::error::address_in_use) return busy(where + " is in use by another program");
+  if (error) return unavailable(where + ": " + error.message());
+  return ok();
+}
+
+Result<void> HttpServer::Impl::listen_local() {
+  if (connect_unix(options.socket)) {
+    return busy(options.socket.string() + " is served by another opalined");
+  }
+  Result<FileDescriptor> fd = listen_unix(options.socket);
+  if (!fd) return fd.error();
+  error_code error;
+  local.assign(Local(), fd->get(), error);
+  if (error) return unavailable(options.socket.string() + ": " + error.message());
+  fd->release();
+  return ok();
+}
+
+template <class Acceptor>
+net::awaitable<void> HttpServer::Impl::accept_from(Acceptor& acceptor, bool same_user) {
+  for (;;) {
+    error_code error;
+    typename Acceptor::protocol_type::socket socket(context);
+    co_await acceptor.async_accept(socket, into(error));
+    if (error == net::error::operation_aborted) co_return;
+    if (error) {  // out of descriptors, perhaps: give the connections time to end
+      log::warning("accept: {}", error.message());
+      net::steady_timer pause(context, std::chrono::seconds(1));
+      co_await pause.async_wait(into(error));
+      continue;
+    }
+    Stream stream{Generic::socket(std::move(socket))};
+    net::co_spawn(context, serve(std::move(stream), same_user), net::detached);
+  }
+}
+
+net::awaitable<void> HttpServer::Impl::serve(Stream stream, bool same_user) {
+  const Counted counted(connections);
+  try {
+    if (connections > options.max_connections) {
+      HttpResponse response = problem(503, "busy", "too many connections");
+      co_await write(stream, response, false);
+    } else {
+      beast::flat_buffer buffer;
+      while (co_await serve_one(stream, buffer, same_user)) {
+      }
+    }
+    co_await linger(stream);
+  } catch (const std::exception& e) {
+    log::error("connection: {}", e.what());
+  }
+}
+
+// False when the connection should end.
+net::awaitable<bool> HttpServer::Impl::serve_one(Stream& stream,
+                                                 beast::flat_buffer& buffer,
+                                                 bool same_user) {
+  http::request_parser<http::string_body> parser;
+  parser.header_limit(kHeaderLimit);
+  parser.body_limit(kBodyLimit);
+  error_code error;
+  stream.expires_after(options.read_deadline);
+  co_await http::async_read(stream, buffer, parser, into(error));
+  if (is_gone(error)) co_return false;
+  if (error == beast::error::timeout && !parser.got_some()) co_return false;
+  HttpResponse response = error ? response_to(error) : handle(parser.get(), same_user);
+  const bool keep_alive = !error && parser.get().keep_alive() && response.stream == nullptr;
+  co_await write(stream, response, keep_alive);
+  co_return keep_alive;
+}
+
+HttpResponse HttpServer::Impl::handle(const http::request<http::string_body>& message,
+                                      bool same_user) {
+  const std::optional<HttpRequest> request = plain(message, same_user);
+  if (!request) return problem(400, "invalid_argument", "the target is not a path");
+  if (std::optional<HttpResponse> refusal = refuse(*request, options.token)) {
+    return *std::move(refusal);
+  }
+  HttpResponse response = handler(*request);
+  if (response.stream != nullptr && streams >= options.max_streams) {
+    return problem(503, "busy", "too many event streams");
+  }
+  return response;
+}
+
+template <class Body>
+void HttpServer::Impl::fill_head(http::response<Body>& head,
+                                 const HttpResponse& response,
+                                 bool keep_alive) const {
+  head.version(11);
+  head.result(static_cast<unsigned>(response.status));
+  head.keep_alive(keep_alive);
+  head.set(http::field::content_type, response.content_type);
+  head.set(http::field::cache_control, "no-store");
+  head.set("X-Content-Type-Options", "nosniff");
+  for (const auto& [name, value] : response.headers) head.set(name, value);
+}
+
+// Errors of writing end the connection, and are found by the next read.
+net::awaitable<void> HttpServer::Impl::write(Stream& stream,
+                                             HttpResponse& response,
+                                             bool keep_alive) {
+  error_code error;
+  stream.expires_after(options.write_deadline);
+  if (!response.file && response.stream == nullptr) {
+    http::response<http::string_body> message;
+    fill_head(message, response, keep_alive);
+    message.body() = std::move(response.body);
+    message.prepare_payload();
+    co_await http::async_write(stream, message, into(error));
+    co_return;
+  }
+  http::response<http::empty_body> head;
+  fill_head(head, response, keep_alive);
+  if (response.file) {
+    head.content_length(response.file->size);
+  } else {
+    head.chunked(true);
+  }
+  http::response_serializer<http::empty_body> serializer(head);
+  co_await http::async_write_header(stream, serializer, into(error));
+  if (!error && response.file) co_await write_file(stream, *response.file, error);
+  if (!error && response.stream != nullptr) co_await write_stream(stream, *response.stream, error);
+  if (error) stream.close();
+}
+
+// Exactly as many bytes as were announced; a file that has shrunk breaks the connection.
+net::awaitable<void> HttpServer::Impl::write_file(Stream& stream,
+                                                  OpenArtefact& file,
+                                                  error_code& error) {
+  std::vector<char> chunk(kFileChunk);
+  std::uint64_t left = file.size;
+  while (left > 0 && !error) {
+    const std::size_t want = static_cast<std::size_t>(std::min<std::uint64_t>(left, chunk.size()));
+    const ssize_t got = ::read(file.file.get(), chunk.data(), want);
+    if (got <= 0) {
+      error = net::error::eof;
+      co_return;
+    }
+    stream.expires_after(options.write_deadline);
+    const net::const_buffer bytes(chunk.data(), static_cast<std::size_t>(got));
+    co_await net::async_write(stream, bytes, into(error));
+    left -= static_cast<std::uint64_t>(got);
+  }
+}
+
+net::awaitable<void> HttpServer::Impl::write_stream(Stream& stream,
+                                                    TextStream& text,
+                                                    error_code& error) {
+  const Counted counted(streams);
+  net::steady_timer timer(context);
+  for (int silent = 0; !error; ++silent) {
+    std::string next = text.next();
+    const bool more = next.size() >= kBusyStream;
+    if (next.empty() && silent >= kPeriodsPerHeartbeat) next = ": still here\n\n";
+    if (!next.empty()) {
+      silent = 0;
+      co_await write_chunk(stream, next, error);
+    }
+    if (text.is_over()) break;
+    if (more) continue;
+    timer.expires_after(kStreamPeriod);
+    co_await timer.async_wait(into(error));
+  }
+  if (error) co_return;
+  stream.expires_after(options.write_deadline);
+  const auto last = http::make_chunk_last();
+  co_await net::async_write(stream, last, into(error));
+}
+
+net::awaitable<void> HttpServer::Impl::write_chunk(Stream& stream,
+                                                   const std::string& text,
+                                                   error_code& error) {
+  stream.expires_after(options.write_deadline);
+  const net::const_buffer bytes(text.data(), text.size());
+  const auto chunk = http::make_chunk(bytes);
+  co_await net::async_write(stream, chunk, into(error));
+}
+
+// What the peer still sends is read and dropped, so that it gets to read our answer.
+net::awaitable<void> HttpServer::Impl::linger(Stream& stream) {
+  error_code error;
+  stream.socket().shutdown(Generic::socket::shutdown_send, error);
+  std::vector<char> dropped(kFileChunk);
+  stream.expires_after(kLingerDeadline);
+  for (std::size_t total = 0; !error && total < kLingerLimit;) {
+    const net::mutable_buffer space(dropped.data(), dropped.size());
+    total += co_await stream.async_read_some(space, into(error));
+  }
+  stream.close();
+}
+
+Result<std::unique_ptr<HttpServer>> HttpServer::listen(const Options& options, Handler handler) {
+  auto impl = std::make_unique<Impl>(options, std::move(handler));
+  if (!options.address.empty()) {
+    if (auto listening = impl->listen_tcp(); !listening) return listening.error();
+  }
+  if (!options.socket.empty()) {
+    if (auto listening = impl->listen_local(); !listening) return listening.error();
+  }
+  return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
+}
+
+HttpServer::HttpServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+HttpServer::~HttpServer() {
+  if (impl_->options.socket.empty()) return;
+  std::error_code ignored;
+  std::filesystem::remove(impl_->options.socket, ignored);
+}
+
+std::uint16_t HttpServer::port() const {
+  error_code error;
+  const Tcp::endpoint endpoint = impl_->tcp.local_endpoint(error);
+  return error ? std::uint16_t{0} : endpoint.port();
+}
+
+void HttpServer::run() {
+  net::signal_set signals(impl_->context, SIGTERM, SIGINT);
+  signals.async_wait([this](const error_code& error, int) {
+    if (!error) stop();
+  });
+  if (impl_->tcp.is_open()) {
+    net::co_spawn(impl_->context, impl_->accept_from(impl_->tcp, false), net::detached);
+  }
+  if (impl_->local.is_open()) {
+    net::co_spawn(impl_->context, impl_->accept_from(impl_->local, true), net::detached);
+  }
+  impl_->context.run();
+}
+
+void HttpServer::stop() { impl_->context.stop(); }
+
+}  // namespace opaline::daemon

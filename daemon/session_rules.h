@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+
+#include "base/session_directory.h"
+#include "daemon/station.h"
+
+namespace opaline::daemon {
+
+/// What a session directory is made from: the texts as given, checked, and resolved where they are
+/// not. No file is opened but those that a simulated or replayed rig names, and these may be named
+/// only by this user's own socket; over TCP they are kInvalidArgument.
+/// Errors: kInvalidArgument with every problem of the texts, one a line.
+Result<SessionDirectory::Contents> contents_of(const NewSession& wish);
+
+/// The lock of the station that a session's rig names; empty when its configuration is unreadable.
+std::filesystem::path station_lock_of(const SessionDirectory& session);
+
+}  // namespace opaline::daemon
