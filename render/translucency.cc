@@ -1,0 +1,158 @@
+#include "render/translucency.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "reconstruct/diffusion/fresnel.h"
+#include "reconstruct/diffusion/medium.h"
+
+namespace opaline::render {
+namespace {
+
+namespace diffusion = reconstruct::diffusion;
+
+constexpr double kUselessResidual = 1e-3;  // a picture of this shows the solver, not the material
+
+Result<void> validate(const Material& material, std::span<const Light> lights) {
+  const Block& block = material.block;
+  for (const ChannelCoefficients& channel : material.channels)
+    if (channel.absorption.size() != block.cell_count() ||
+        channel.reduced_scattering.size() != block.cell_count())
+      return invalid_argument("the material's coefficients do not cover its block");
+  for (std::size_t m = 0; m < lights.size(); ++m) {
+    const Image<float>& e = lights[m].irradiance;
+    const Face face = lights[m].lit_face;
+    if (e.width() != block.face_width(face) || e.height() != block.face_height(face) ||
+        e.channels() != kColorChannels)
+      return invalid_argument(
+          fmt::format("light {} does not cover the cells of face {}", m, to_string(face)));
+    for (const float value : e.samples())
+      if (!(value >= 0.0F) || !std::isfinite(value))
+        return invalid_argument(fmt::format("light {}: irradiance {}; expected >= 0", m, value));
+  }
+  return ok();
+}
+
+/// Light transmitted into the surface, q = (1 - R(0)) E, of one channel.
+std::vector<double> transmitted(const Light& light, double ior, int channel) {
+  const double share = 1.0 - diffusion::normal_reflectance(ior);
+  std::vector<double> q;
+  q.reserve(light.irradiance.pixel_count());
+  const auto samples = light.irradiance.samples();
+  for (std::size_t i = channel; i < samples.size(); i += kColorChannels)
+    q.push_back(share * samples[i]);
+  return q;
+}
+
+/// One colour channel of a material, its equation, and how light enters it by each face.
+class Channel {
+ public:
+  Channel(const Material& material,
+          int channel,
+          const diffusion::Boundary& boundary,
+          diffusion::SourceOptions source)
+      : channel_(channel),
+        ior_(material.ior),
+        boundary_(boundary),
+        source_(source),
+        medium_(diffusion::make_medium(material.block, material.channels[channel], boundary)) {}
+
+  const diffusion::Medium& medium() const { return medium_; }
+
+  void deposit(const Light& light, std::span<double> b) {
+    entry(light.lit_face).deposit(transmitted(light, ior_, channel_), b);
+  }
+
+  void write_surface(const Light& light, std::span<const double> phi, SurfaceField& field) {
+    const diffusion::SurfaceTerms terms =
+        entry(light.lit_face).surface_terms(transmitted(light, ior_, channel_));
+    for (const Face face : kFaces) {
+      const bool lit = face == light.lit_face;
+      write_face(face, phi, lit ? terms : diffusion::SurfaceTerms{}, field);
+    }
+  }
+
+ private:
+  diffusion::FaceSource& entry(Face face) {
+    auto& made = entries_[static_cast<std::size_t>(face)];
+    if (!made) made.emplace(medium_, boundary_, face, source_);
+    return *made;
+  }
+
+  void write_face(Face face,
+                  std::span<const double> phi,
+                  const diffusion::SurfaceTerms& terms,
+                  SurfaceField& field) const {
+    std::vector<double> flux(medium_.block.face_cell_count(face));
+    diffusion::net_flux(medium_, boundary_, face, phi, terms.source, terms.escape, flux);
+    FaceField& out = field.faces[static_cast<std::size_t>(face)];
+    for (std::size_t i = 0; i < flux.size(); ++i) {
+      const double source = terms.source.empty() ? 0.0 : terms.source[i];
+      const std::size_t at = kColorChannels * i + channel_;
+      out.net_flux.samples()[at] = static_cast<float>(flux[i]);
+      out.fluence.samples()[at] = static_cast<float>(source + 2.0 * boundary_.a * flux[i]);
+    }
+  }
+
+  int channel_;
+  double ior_;
+  diffusion::Boundary boundary_;
+  diffusion::SourceOptions source_;
+  diffusion::Medium medium_;
+  std::array<std::optional<diffusion::FaceSource>, 6> entries_;
+};
+
+SurfaceField dark(const Material& material) {
+  SurfaceField field{material.block, material.ior, {}};
+  for (const Face face : kFaces) {
+    const Image<float> black(
+        material.block.face_width(face), material.block.face_height(face), kColorChannels);
+    field.faces[static_cast<std::size_t>(face)] = {black, black};
+  }
+  return field;
+}
+
+Result<void> illuminate_channel(Channel& channel,
+                                std::span<const Light> lights,
+                                const diffusion::SolveOptions& options,
+                                diffusion::FluenceSolver& solver,
+                                std::stop_token stop,
+                                std::vector<SurfaceField>& fields) {
+  if (auto prepared = solver.prepare(channel.medium()); !prepared) return prepared;
+  const std::size_t cells = channel.medium().block.cell_count();
+  diffusion::FieldBatch b(cells, static_cast<int>(lights.size()));
+  diffusion::FieldBatch phi(cells, b.count);
+  for (int m = 0; m < b.count; ++m) channel.deposit(lights[m], {b.field(m), cells});
+  const auto summary = solver.solve(b, phi, options, std::move(stop));
+  if (!summary) return summary.error();
+  if (!(summary->relative_residual < kUselessResidual))
+    return internal_error(fmt::format("the diffusion solver {}", summary->message));
+  for (int m = 0; m < b.count; ++m)
+    channel.write_surface(lights[m], {phi.field(m), cells}, fields[m]);
+  return ok();
+}
+
+}  // namespace
+
+Result<std::vector<SurfaceField>> illuminate(const Material& material,
+                                             std::span<const Light> lights,
+                                             const TranslucencyOptions& options,
+                                             diffusion::FluenceSolver& solver,
+                                             std::stop_token stop) {
+  if (auto good = validate(material, lights); !good) return good.error();
+  const auto boundary = diffusion::make_boundary(options.boundary, material.ior);
+  if (!boundary) return boundary.error();
+  std::vector<SurfaceField> fields(lights.size(), dark(material));
+  if (lights.empty()) return fields;
+  for (int c = 0; c < kColorChannels; ++c) {
+    Channel channel(material, c, *boundary, options.source);
+    auto lit = illuminate_channel(channel, lights, options.solve, solver, stop, fields);
+    if (!lit) return lit.error().in(fmt::format("{} channel", kChannelNames[c]));
+  }
+  return fields;
+}
+
+}  // namespace opaline::render
