@@ -331,7 +331,8 @@ Result<RigStatus> Rig::status() {
   const std::lock_guard lock(mutex_);
   const nanoseconds now = clock_.now();
   const Shown shown = timeline_.at(now);
-  return RigStatus{.lamp_on = shown != nullptr,
+  return RigStatus{.identity = options_.identity,
+                   .lamp_on = shown != nullptr,
                    .pattern_id = shown ? shown->id : 0,
                    .exposures = exposures_,
                    .camera_open = camera_session_ != 0,

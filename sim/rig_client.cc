@@ -100,6 +100,12 @@ Result<RigTruth> RigClient::truth() {
   return decode_truth(*reply);
 }
 
+Result<void> RigClient::end() {
+  const auto reply = ask("end");
+  if (!reply) return reply.error();
+  return ok();
+}
+
 Result<void> RigClient::arm(const Faults& faults) {
   const auto reply = ask("arm", encode(faults));
   if (!reply) return reply.error();

@@ -29,6 +29,8 @@ class RigClient : public RigPort {
   Result<RigStatus> status() override;
   Result<RigTruth> truth() override;
   Result<void> arm(const Faults& faults) override;
+  /// Asks the rig to darken its lamp and end; it does so within a second.
+  Result<void> end();
 
  private:
   Result<RigMessage> ask(const char* what,

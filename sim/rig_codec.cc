@@ -131,7 +131,8 @@ Result<drivers::Pattern> decode_pattern(const RigMessage& message) {
 }
 
 RigMessage encode(const RigStatus& status) {
-  return {{{"lamp_on", status.lamp_on},
+  return {{{"identity", status.identity},
+           {"lamp_on", status.lamp_on},
            {"pattern_id", status.pattern_id},
            {"exposures", status.exposures},
            {"camera_open", status.camera_open},
@@ -147,7 +148,8 @@ Result<RigStatus> decode_status(const RigMessage& message) {
     const json& header = message.header;
     auto faults = faults_from_json(header.at("faults"));
     if (!faults) return faults.error();
-    return RigStatus{header.at("lamp_on"),
+    return RigStatus{header.at("identity"),
+                     header.at("lamp_on"),
                      header.at("pattern_id"),
                      header.at("exposures"),
                      header.at("camera_open"),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "base/result.h"
 #include "sim/faults.h"
@@ -14,7 +15,8 @@ struct RigOptions {
   double time_factor = 1.0;  ///< how many times as fast as real time its clock runs; 1 to 1000
   CameraOptics camera;
   ProjectorOptics projector;
-  Faults faults;  ///< to come, from the start
+  std::string identity;  ///< tells it from rigs of other options; whatever its builder likes
+  Faults faults;         ///< to come, from the start
 };
 /// Errors: kInvalidArgument naming the option, its value and what was expected.
 Result<void> validate(const RigOptions& options);

@@ -18,6 +18,7 @@ namespace opaline::sim {
 
 /// What anybody may know about the station from outside.
 struct RigStatus {
+  std::string identity;  ///< as in RigOptions
   bool lamp_on = false;
   std::uint64_t pattern_id = 0;  ///< being shown; 0 = none
   std::uint64_t exposures = 0;   ///< taken since the rig was built

@@ -104,7 +104,7 @@ RigServer::~RigServer() {
 }
 
 Result<void> RigServer::serve(std::chrono::nanoseconds idle, std::stop_token stop) {
-  while (!idle_for(idle)) {
+  while (!ending_ && !idle_for(idle)) {
     const auto ready =
         wait_for(listener_.get(), POLLIN, std::chrono::steady_clock::now() + 500ms, stop);
     if (ready) accept_one();
@@ -138,12 +138,18 @@ void RigServer::answer(int connection, std::stop_token stop) {
   RigMessage reply;
   try {
     const HangUpWatch watch(connection, stop);
-    reply = perform(rig_, *request, watch.token());
+    reply = respond(*request, watch.token());
   } catch (const json::exception& wrong) {
     reply = encode(invalid_argument(fmt::format("malformed request: {}", wrong.what())));
   }
   const auto sent = send_message(connection, reply, soon(), stop);
   if (!sent) log::debug("simulated rig: {}", sent.error().message);
+}
+
+RigMessage RigServer::respond(const RigMessage& request, const std::stop_token& stop) {
+  if (request.header.at("do") != "end") return perform(rig_, request, stop);
+  ending_ = true;
+  return reply_to(rig_.dark());
 }
 
 bool RigServer::idle_for(std::chrono::nanoseconds idle) {

@@ -28,7 +28,7 @@ class RigServer {
                                                    const std::filesystem::path& socket);
   ~RigServer();
 
-  /// Serves until told to stop, or until nobody has asked for anything for `idle` while the lamp is dark.
+  /// Serves until told to stop (by the token, or by a client), or until nobody has asked for anything for `idle` while the lamp is dark.
   Result<void> serve(std::chrono::nanoseconds idle, std::stop_token stop);
 
  private:
@@ -43,6 +43,7 @@ class RigServer {
         listener_(std::move(listener)) {}
 
   void accept_one();
+  RigMessage respond(const RigMessage& request, const std::stop_token& stop);
   void answer(int connection, std::stop_token stop);
   bool idle_for(std::chrono::nanoseconds idle);
 
@@ -50,6 +51,7 @@ class RigServer {
   std::filesystem::path socket_;
   FileLock lock_;
   FileDescriptor listener_;
+  std::atomic<bool> ending_ = false;
   Deadline last_request_ = std::chrono::steady_clock::now();
   std::list<Connection> connections_;
 };

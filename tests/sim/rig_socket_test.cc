@@ -149,6 +149,13 @@ TEST_F(RigSocketTest, ARigStartedAgainWantsItsDevicesOpened) {
   EXPECT_TRUE(camera.capture({kTurn, 0}, {}));
 }
 
+TEST_F(RigSocketTest, EndsWhenAClientAsksForIt) {
+  serve();
+  ASSERT_TRUE(RigClient(socket_).end());
+  serving_.join();
+  EXPECT_TRUE(served_);
+}
+
 TEST_F(RigSocketTest, NonsenseOnTheSocketHurtsNobody) {
   serve();
   {

@@ -1,0 +1,163 @@
+#include "daemon/simulated_rig.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern "C" {  // glibc 2.36 forgets to say so itself
+#include <sys/pidfd.h>
+}
+
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include "base/file_descriptor.h"
+#include "base/files.h"
+#include "base/lock.h"
+#include "base/log.h"
+#include "base/sha256.h"
+#include "config/session_config.h"
+#include "sim/rig_client.h"
+#include "sim/rig_message.h"
+#include "sim/transport_store.h"
+
+namespace opaline::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::Deadline;
+
+/// posix_spawn's two bags of settings, which want destroying.
+struct SpawnSettings {
+  SpawnSettings() {
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawnattr_init(&attributes);
+  }
+  ~SpawnSettings() {
+    ::posix_spawn_file_actions_destroy(&actions);
+    ::posix_spawnattr_destroy(&attributes);
+  }
+  SpawnSettings(const SpawnSettings&) = delete;
+  SpawnSettings& operator=(const SpawnSettings&) = delete;
+
+  posix_spawn_file_actions_t actions{};
+  posix_spawnattr_t attributes{};
+};
+
+std::filesystem::path log_of(const RigProcess& process) {
+  std::filesystem::path log = process.socket;
+  log += ".log";
+  return log;
+}
+
+Result<pid_t> spawn(const RigProcess& process) {
+  std::vector<std::string> words{process.program.string()};
+  words.insert(words.end(), process.arguments.begin(), process.arguments.end());
+  words.insert(words.end(), {"--socket", process.socket.string()});
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  const std::string log = log_of(process).string();
+  SpawnSettings settings;
+  ::posix_spawn_file_actions_addopen(&settings.actions, 0, "/dev/null", O_RDONLY, 0);
+  ::posix_spawn_file_actions_addopen(
+      &settings.actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
+  ::posix_spawn_file_actions_adddup2(&settings.actions, 1, 2);
+  ::posix_spawnattr_setflags(&settings.attributes, POSIX_SPAWN_SETSID);
+  pid_t pid = 0;
+  const int failed =
+      ::posix_spawn(&pid, argv[0], &settings.actions, &settings.attributes, argv.data(), environ);
+  if (failed == 0) return pid;
+  return unavailable(
+      fmt::format("cannot start {}: {}", argv[0], std::generic_category().message(failed)));
+}
+
+/// Whether a rig of the right identity answers. One of another identity is asked to end.
+bool answers(const RigProcess& process) {
+  sim::RigClient client(process.socket);
+  const auto status = client.status();
+  if (!status) return false;
+  if (status->identity == process.identity) return true;
+  log::info("simulated rig at {}: of other options, asked to end", process.socket.string());
+  const auto ended = client.end();
+  if (!ended) log::warning("{}", ended.error().message);
+  return false;
+}
+
+Result<void> wait_until_it_answers(const RigProcess& process,
+                                   pid_t pid,
+                                   const std::stop_token& stop) {
+  const FileDescriptor child(::pidfd_open(pid, 0));
+  const Deadline deadline = std::chrono::steady_clock::now() + process.patience;
+  while (!answers(process)) {
+    const auto ended =
+        sim::wait_for(child.get(), POLLIN, std::chrono::steady_clock::now() + 20ms, stop);
+    if (ended) {
+      ::waitpid(pid, nullptr, 0);
+      if (answers(process)) return ok();  // somebody else was quicker
+      return unavailable(
+          fmt::format("opaline-rig ended at once; see {}", log_of(process).string()));
+    }
+    if (ended.error().code != ErrorCode::kTimeout) return ended.error();
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return timeout(fmt::format("opaline-rig does not answer; see {}", log_of(process).string()));
+    }
+  }
+  return ok();
+}
+
+/// Waits for a rig that was asked to end to let go of its socket.
+Result<void> wait_until_gone(const RigProcess& process, const std::stop_token& stop) {
+  std::filesystem::path lock = process.socket;
+  lock += ".lock";
+  const Deadline deadline = std::chrono::steady_clock::now() + 10s;
+  for (;;) {
+    const auto held = FileLock::is_held(lock);
+    if (!held || !*held) return ok();
+    const auto waited = sim::wait_for(-1, 0, std::chrono::steady_clock::now() + 20ms, stop);
+    if (!waited && waited.error().code == ErrorCode::kCancelled) return waited.error();
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return timeout(fmt::format("the rig at {} does not end", process.socket.string()));
+    }
+  }
+}
+
+}  // namespace
+
+std::string rig_identity(const config::SimConfig& sim) {
+  config::SessionConfig session;
+  session.rig.sim = sim;
+  session.rig.sim.socket.clear();
+  const std::string text = config::to_toml(session);
+  return sha256_hex(std::as_bytes(std::span(text)));
+}
+
+Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
+                                            EventSink& events,
+                                            std::stop_token stop,
+                                            Clock* clock) {
+  auto responses = sim::load_or_compute(
+      sim.scene, sim.transport, {sim.responses, sim.cache}, events, std::move(stop));
+  if (!responses) return responses.error().in("light transport of the simulated sample");
+  sim::RigOptions options = sim.rig;
+  options.identity = rig_identity(sim);
+  return sim::Rig::create(
+      options, std::make_shared<const TransportResponses>(*std::move(responses)), clock);
+}
+
+Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop) {
+  if (answers(process)) return ok();
+  if (auto made = system_files().make_directories(process.socket.parent_path()); !made) return made;
+  if (auto gone = wait_until_gone(process, stop); !gone) return gone;
+  const auto pid = spawn(process);
+  if (!pid) return pid.error();
+  log::info("simulated rig: process {} at {}", *pid, process.socket.string());
+  return wait_until_it_answers(process, *pid, stop);
+}
+
+}  // namespace opaline::daemon
