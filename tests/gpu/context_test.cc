@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "gpu/commands.h"
 #include "gpu/error.h"
 #include "tests/support/vulkan.h"
 
@@ -16,6 +17,18 @@ TEST(Context, OpensTheSoftwareDeviceWithoutAValidationMessage) {
   ASSERT_TRUE(context) << context.error().message;
   EXPECT_EQ((*context)->device().kind, DeviceKind::kSoftware);
   EXPECT_GE((*context)->device().max_binding_bytes, 128U << 20);
+}
+
+TEST(Context, PassesOnWhatTheValidationLayerSays) {
+  int messages = 0;
+  ContextOptions options = tests::validated();
+  options.on_validation_message = [&](std::string_view) { ++messages; };
+  const auto context = Context::create(options);
+  ASSERT_TRUE(context);
+  auto commands = Commands::create(**context);
+  ASSERT_TRUE(commands);
+  (void)commands->end();  // which nobody began
+  EXPECT_GE(messages, 1);
 }
 
 TEST(Context, NamesTheDevicesItRefusesAndWhy) {
