@@ -32,7 +32,16 @@ std::uint64_t content_hash(const Image<std::uint8_t>& codes) {
   return hash;
 }
 
-Result<void> check(const TransportResponses& r) {
+/// Responses hold for one place of the camera; within a hundredth of its distance the picture is the same.
+Result<void> check_view(const TransportResponses& r, const CameraModel& camera) {
+  const Vec3 middle = r.block.face_cell_centre(
+      r.seen_face, r.block.face_width(r.seen_face) / 2, r.block.face_height(r.seen_face) / 2);
+  const double off = length(camera.centre() - r.camera_centre);
+  if (off <= 0.01 * length(r.camera_centre - middle)) return ok();
+  return invalid_argument(fmt::format("made for a camera {:.1f} mm away from where it is", off));
+}
+
+Result<void> check(const TransportResponses& r, const CameraModel& camera) {
   if (r.patches_x < 1 || r.patches_y < 1 ||
       r.patches.size() != static_cast<std::size_t>(r.patches_x) * r.patches_y) {
     return invalid_argument(fmt::format(
@@ -45,7 +54,7 @@ Result<void> check(const TransportResponses& r) {
       return invalid_argument("a response's size is not that of the seen face's cells");
     }
   }
-  return ok();
+  return check_view(r, camera);
 }
 
 }  // namespace
@@ -65,7 +74,8 @@ Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
                                          std::shared_ptr<const TransportResponses> responses,
                                          Clock* clock) {
   if (auto good = validate(options); !good) return good.error().in("rig");
-  if (auto good = check(*responses); !good) return good.error().in("transport responses");
+  if (auto good = check(*responses, options.camera.model); !good)
+    return good.error().in("transport responses");
   return std::unique_ptr<Rig>(new Rig(options, std::move(responses), clock));
 }
 

@@ -205,6 +205,11 @@ TEST_F(RigTest, ResponsesThatDoNotFitAreRefused) {
   responses = *support::tiny_responses();
   responses.block.nx = 9;
   EXPECT_FALSE(Rig::create(options_, std::make_shared<TransportResponses>(responses)));
+  responses = *support::tiny_responses();
+  responses.camera_centre.x += 5.0;
+  const auto elsewhere = Rig::create(options_, std::make_shared<TransportResponses>(responses));
+  ASSERT_FALSE(elsewhere);
+  EXPECT_THAT(elsewhere.error().message, ::testing::HasSubstr("5.0 mm away"));
 }
 
 class RigFaultTest : public RigTest {
