@@ -10,17 +10,10 @@
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/diffusion/source.h"
+#include "reconstruct/evaluation.h"
 #include "reconstruct/regularizer.h"
 
 namespace opaline::reconstruct {
-
-/// The objective of one channel at one point, with its gradient.
-struct Evaluation {
-  double value = 0.0;        ///< J
-  double chi_squared = 0.0;  ///< sum w (L - L*)^2, twice the data term
-  double regularization = 0.0;
-  std::vector<double> gradient;  ///< dJ/dp
-};
 
 /// The inverse problem of one channel (docs/physics.md, "Inverse problem"):
 ///

@@ -1,0 +1,112 @@
+#include "reconstruct/channel_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace opaline::reconstruct {
+namespace {
+
+constexpr std::size_t kStallWindow = 10;  // iterations over which progress is judged
+
+}  // namespace
+
+ChannelSolver::ChannelSolver(const ChannelProblem& problem,
+                             const InverseOptions& options,
+                             diffusion::FluenceSolver& solver,
+                             const Clock& clock,
+                             Hooks hooks)
+    : problem_(problem),
+      options_(options),
+      clock_(clock),
+      hooks_(std::move(hooks)),
+      objective_(problem, solver, {options.tolerance, options.regularization}) {}
+
+Bounds ChannelSolver::bounds() const {
+  const std::size_t cells = problem_.block.cell_count();
+  Bounds b;
+  b.lower.assign(cells, std::log(options_.reduced_scattering.lowest));
+  b.upper.assign(cells, std::log(options_.reduced_scattering.highest));
+  b.lower.resize(2 * cells, std::log(options_.absorption.lowest));
+  b.upper.resize(2 * cells, std::log(options_.absorption.highest));
+  return b;
+}
+
+void ChannelSolver::record(ChannelProgress& progress) {
+  const Evaluation& at = progress.state.at;
+  ChannelReport& report = progress.report;
+  report.solves = solves_before_ + objective_.solves();
+  report.seconds = seconds_before_ + std::chrono::duration<double>(clock_.now() - start_).count();
+  report.history.push_back({static_cast<int>(report.history.size()),
+                            at.value,
+                            at.chi_squared / static_cast<double>(report.data_count),
+                            at.regularization,
+                            report.solves});
+  hooks_.iterated(report);
+}
+
+Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
+  const auto fit = fit_homogeneous(problem_, options_, objective_, stop);
+  if (!fit) return fit.error().in("homogeneous fit");
+  ChannelProgress progress;
+  progress.report.homogeneous = *fit;
+  progress.report.data_count = problem_.data_count;
+  const std::size_t cells = problem_.block.cell_count();
+  progress.state.x.assign(cells, std::log(fit->reduced_scattering));
+  progress.state.x.resize(2 * cells, std::log(fit->absorption));
+  auto at = objective_.evaluate(progress.state.x, stop);
+  if (!at) return at.error();
+  progress.state.at = *std::move(at);
+  record(progress);
+  return progress;
+}
+
+std::optional<StopReason> ChannelSolver::reason_to_stop(const ChannelReport& report) const {
+  const auto& history = report.history;
+  const IterationRecord& now = history.back();
+  if (now.chi_squared_per_datum <= options_.discrepancy) return StopReason::kDiscrepancy;
+  if (now.iteration >= options_.max_iterations) return StopReason::kIterationLimit;
+  if (history.size() <= kStallWindow) return std::nullopt;
+  const double gained = history[history.size() - 1 - kStallWindow].objective - now.objective;
+  if (gained < options_.stalled * now.objective) return StopReason::kStalled;
+  return std::nullopt;
+}
+
+Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {
+  const auto objective = [this](std::span<const double> x, std::stop_token token) {
+    return objective_.evaluate(x, std::move(token));
+  };
+  const Bounds box = bounds();
+  for (;;) {
+    if (const auto reason = reason_to_stop(progress.report)) {
+      progress.report.stop_reason = *reason;
+      return ok();
+    }
+    const auto outcome = lbfgs_step(progress.state, box, {}, objective, stop);
+    if (!outcome) return outcome.error();
+    if (*outcome == StepOutcome::kNoDescent) {
+      progress.report.stop_reason = StopReason::kNoDescent;
+      return ok();
+    }
+    record(progress);
+    if (progress.report.history.back().iteration % options_.checkpoint_every != 0) continue;
+    if (auto saved = hooks_.checkpoint(progress); !saved) return saved;
+    objective_.start_afresh();
+  }
+}
+
+Result<ChannelProgress> ChannelSolver::run(std::optional<ChannelProgress> from,
+                                           std::stop_token stop) {
+  start_ = clock_.now();
+  if (from) {
+    solves_before_ = from->report.solves;
+    seconds_before_ = from->report.seconds;
+  } else {
+    auto begun = begin(stop);
+    if (!begun) return begun.error();
+    from = *std::move(begun);
+  }
+  if (auto done = iterate(*from, stop); !done) return done.error();
+  return *std::move(from);
+}
+
+}  // namespace opaline::reconstruct

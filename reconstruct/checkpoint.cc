@@ -1,0 +1,229 @@
+#include "reconstruct/checkpoint.h"
+
+#include <bit>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "base/log.h"
+#include "base/sha256.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kFormat = 1;
+constexpr std::size_t kLargestFile = std::size_t{4} << 30;
+static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
+
+json pack(const std::vector<double>& values) {
+  std::vector<std::uint8_t> bytes(values.size() * sizeof(double));
+  if (!values.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
+  return json::binary(std::move(bytes));
+}
+
+std::vector<double> unpack(const json& j) {
+  const auto& bytes = j.get_binary();
+  std::vector<double> values(bytes.size() / sizeof(double));
+  if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(double));
+  return values;
+}
+
+json to_json(const ChannelReport& r) {
+  json history = json::array();
+  for (const IterationRecord& i : r.history) {
+    history.push_back(
+        {i.iteration, i.objective, i.chi_squared_per_datum, i.regularization, i.solves});
+  }
+  return {{"homogeneous",
+           {r.homogeneous.reduced_scattering,
+            r.homogeneous.absorption,
+            r.homogeneous.chi_squared,
+            r.homogeneous.iterations}},
+          {"history", std::move(history)},
+          {"stop_reason", static_cast<int>(r.stop_reason)},
+          {"data_count", r.data_count},
+          {"solves", r.solves},
+          {"seconds", r.seconds}};
+}
+
+ChannelReport report_from(const json& j) {
+  ChannelReport r;
+  const json& h = j.at("homogeneous");
+  r.homogeneous = {
+      h.at(0).get<double>(), h.at(1).get<double>(), h.at(2).get<double>(), h.at(3).get<int>()};
+  for (const json& i : j.at("history")) {
+    r.history.push_back({i.at(0).get<int>(),
+                         i.at(1).get<double>(),
+                         i.at(2).get<double>(),
+                         i.at(3).get<double>(),
+                         i.at(4).get<long>()});
+  }
+  r.stop_reason = static_cast<StopReason>(j.at("stop_reason").get<int>());
+  r.data_count = j.at("data_count").get<std::size_t>();
+  r.solves = j.at("solves").get<long>();
+  r.seconds = j.at("seconds").get<double>();
+  return r;
+}
+
+json to_json(const LbfgsState& s) {
+  json pairs = json::array();
+  for (const CurvaturePair& p : s.pairs) pairs.push_back({pack(p.s), pack(p.y)});
+  return {{"x", pack(s.x)},
+          {"value", s.at.value},
+          {"chi_squared", s.at.chi_squared},
+          {"regularization", s.at.regularization},
+          {"gradient", pack(s.at.gradient)},
+          {"pairs", std::move(pairs)}};
+}
+
+LbfgsState state_from(const json& j) {
+  LbfgsState s;
+  s.x = unpack(j.at("x"));
+  s.at = {j.at("value").get<double>(),
+          j.at("chi_squared").get<double>(),
+          j.at("regularization").get<double>(),
+          unpack(j.at("gradient"))};
+  for (const json& p : j.at("pairs")) s.pairs.push_back({unpack(p.at(0)), unpack(p.at(1))});
+  return s;
+}
+
+json to_json(const Checkpoint& checkpoint) {
+  json finished = json::array();
+  for (const auto& channel : checkpoint.finished) {
+    if (!channel) break;
+    finished.push_back({{"absorption", pack(channel->coefficients.absorption)},
+                        {"reduced_scattering", pack(channel->coefficients.reduced_scattering)},
+                        {"report", to_json(channel->report)}});
+  }
+  json j{{"finished", std::move(finished)}};
+  if (checkpoint.current) {
+    j["current"] = {{"state", to_json(checkpoint.current->state)},
+                    {"report", to_json(checkpoint.current->report)}};
+  }
+  return j;
+}
+
+Checkpoint checkpoint_from(const json& j) {
+  Checkpoint checkpoint;
+  std::size_t channel = 0;
+  for (const json& f : j.at("finished")) {
+    checkpoint.finished.at(channel++) = {
+        {unpack(f.at("absorption")), unpack(f.at("reduced_scattering"))},
+        report_from(f.at("report"))};
+  }
+  if (j.contains("current")) {
+    const json& c = j.at("current");
+    checkpoint.current = {state_from(c.at("state")), report_from(c.at("report"))};
+  }
+  return checkpoint;
+}
+
+void append(std::vector<std::byte>& bytes, const void* data, std::size_t size) {
+  const auto* begin = static_cast<const std::byte*>(data);
+  bytes.insert(bytes.end(), begin, begin + size);
+}
+
+template <class T>
+void append_image(std::vector<std::byte>& bytes, const Image<T>& image) {
+  const std::array shape{image.width(), image.height(), image.channels()};
+  append(bytes, shape.data(), sizeof shape);
+  append(bytes, image.samples().data(), image.samples().size_bytes());
+}
+
+void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
+  const std::array numbers{o.model_error,
+                           o.regularization,
+                           static_cast<double>(o.max_iterations),
+                           o.tolerance,
+                           o.discrepancy,
+                           o.stalled,
+                           o.absorption.lowest,
+                           o.absorption.highest,
+                           o.reduced_scattering.lowest,
+                           o.reduced_scattering.highest,
+                           static_cast<double>(o.checkpoint_every),
+                           static_cast<double>(o.source),
+                           static_cast<double>(o.deposit),
+                           static_cast<double>(o.boundary),
+                           static_cast<double>(kFormat)};
+  append(bytes, numbers.data(), sizeof numbers);
+}
+
+// Parses what was read; what the library throws ends here.
+Result<Checkpoint> parse(std::span<const std::byte> bytes, const std::string& fingerprint) {
+  constexpr std::size_t kChecksum = 64;
+  if (bytes.size() < kChecksum) return invalid_argument("truncated");
+  const std::string_view checksum(reinterpret_cast<const char*>(bytes.data()), kChecksum);
+  const auto body = bytes.subspan(kChecksum);
+  if (sha256_hex(body) != checksum) return invalid_argument("damaged");
+  try {
+    const auto* begin = reinterpret_cast<const std::uint8_t*>(body.data());
+    const json j = json::from_cbor(begin, begin + body.size());
+    if (j.at("format").get<int>() != kFormat) return invalid_argument("of another version");
+    if (j.at("fingerprint").get<std::string>() != fingerprint) {
+      return invalid_argument("of another dataset or other options");
+    }
+    return checkpoint_from(j);
+  } catch (const std::exception& e) {
+    return invalid_argument(e.what());
+  }
+}
+
+}  // namespace
+
+std::string fingerprint(const Dataset& dataset, const InverseOptions& options) {
+  std::vector<std::byte> bytes;
+  const auto cells = dataset.block.cells();
+  const auto spacing = dataset.block.spacing();
+  append(bytes, cells.data(), sizeof cells);
+  append(bytes, spacing.data(), sizeof spacing);
+  append(bytes, &dataset.ior, sizeof dataset.ior);
+  const std::array faces{dataset.lit_face, dataset.seen_face};
+  append(bytes, faces.data(), sizeof faces);
+  append_image(bytes, dataset.view_cosine);
+  for (const Illumination& i : dataset.illuminations) {
+    append(bytes, i.name.data(), i.name.size() + 1);
+    append(bytes, &i.held_out, sizeof i.held_out);
+    append_image(bytes, i.irradiance);
+    append_image(bytes, i.radiance);
+    append_image(bytes, i.radiance_variance);
+    append_image(bytes, i.mask);
+  }
+  append_options(bytes, options);
+  return sha256_hex(bytes);
+}
+
+CheckpointStore::CheckpointStore(FileOperations& files,
+                                 std::filesystem::path directory,
+                                 std::string print)
+    : files_(files), directory_(std::move(directory)), fingerprint_(std::move(print)) {}
+
+Checkpoint CheckpointStore::load() const {
+  const auto bytes = read_bytes(path(), kLargestFile);
+  if (!bytes) {
+    if (bytes.error().code != ErrorCode::kNotFound)
+      log::warning("starting again: {}", bytes.error().message);
+    return {};
+  }
+  auto checkpoint = parse(*bytes, fingerprint_);
+  if (checkpoint) return *std::move(checkpoint);
+  log::warning("starting again: {}: {}", path().string(), checkpoint.error().message);
+  return {};
+}
+
+Result<void> CheckpointStore::save(const Checkpoint& checkpoint) const {
+  json j = to_json(checkpoint);
+  j["format"] = kFormat;
+  j["fingerprint"] = fingerprint_;
+  const std::vector<std::uint8_t> body = json::to_cbor(j);
+  const std::string checksum = sha256_hex(std::as_bytes(std::span(body)));
+  std::vector<std::byte> bytes;
+  bytes.reserve(checksum.size() + body.size());
+  append(bytes, checksum.data(), checksum.size());
+  append(bytes, body.data(), body.size());
+  if (auto made = files_.make_directories(directory_); !made) return made;
+  return write_whole(files_, path(), std::span<const std::byte>(bytes));
+}
+
+}  // namespace opaline::reconstruct

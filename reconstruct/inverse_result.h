@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/image.h"
+#include "base/material.h"
+#include "reconstruct/homogeneous_fit.h"
+
+namespace opaline::reconstruct {
+
+/// Why the minimisation of a channel ended.
+enum class StopReason : std::uint8_t {
+  kDiscrepancy,  ///< the pictures are explained to within their variance: going on would fit the
+                 ///< noise
+  kStalled,      ///< the objective hardly falls any more
+  kNoDescent,    ///< a minimum, to the accuracy of the solves
+  kIterationLimit,
+};
+std::string_view to_string(
+    StopReason reason);  ///< "discrepancy" | "stalled" | "no_descent" | "iteration_limit"
+std::string_view explain(StopReason reason);  ///< one sentence for people
+
+/// One iteration; the first of a history, 0, is the homogeneous fit.
+struct IterationRecord {
+  int iteration = 0;
+  double objective = 0.0;
+  double chi_squared_per_datum = 0.0;
+  double regularization = 0.0;
+  long solves = 0;  ///< for one right-hand side, of the channel so far
+  bool operator==(const IterationRecord&) const = default;
+};
+
+/// How the reconstruction of one channel went.
+struct ChannelReport {
+  HomogeneousFit homogeneous;
+  std::vector<IterationRecord> history;
+  StopReason stop_reason = StopReason::kIterationLimit;
+  std::size_t data_count = 0;
+  long solves = 0;  ///< for one right-hand side
+  double seconds = 0.0;
+};
+
+/// ||L - L*|| / ||L*|| over the usable cells of some illuminations, and what their noise alone
+/// would give.
+struct RelightingError {
+  double error = 0.0;
+  double noise_floor = 0.0;
+};
+
+/// A reconstruction: the material, how it came about, and what it predicts.
+struct InverseResult {
+  Material material;
+  std::array<ChannelReport, kColorChannels> channels;
+  std::vector<Image<float>>
+      predicted;  ///< radiance per illumination of the dataset, held-out ones too; as measured ones
+  RelightingError fitted;    ///< over the illuminations of the fit
+  RelightingError held_out;  ///< over those kept from it; 0 when there is none
+  std::string solver;        ///< "host, 2 threads, AVX2"
+  double seconds = 0.0;
+};
+
+}  // namespace opaline::reconstruct

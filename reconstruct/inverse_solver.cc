@@ -1,0 +1,153 @@
+#include "reconstruct/inverse_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/log.h"
+#include "reconstruct/channel_solver.h"
+#include "reconstruct/prediction.h"
+#include "reconstruct/relighting_error.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+std::string channel_name(std::size_t channel) { return kChannelNames.at(channel); }
+
+class Reconstruction {
+ public:
+  Reconstruction(const Dataset& dataset,
+                 const InverseOptions& options,
+                 const InverseContext& context)
+      : dataset_(dataset), options_(options), context_(context), start_(context.clock.now()) {}
+
+  Result<InverseResult> run(std::stop_token stop) {
+    if (context_.checkpoints != nullptr) checkpoint_ = context_.checkpoints->load();
+    result_.material.block = dataset_.block;
+    result_.material.ior = dataset_.ior;
+    result_.solver = context_.solver.description();
+    result_.predicted = empty_pictures(dataset_);
+    for (std::size_t channel = 0; channel < kColorChannels; ++channel) {
+      auto done = run_channel(channel, stop);
+      if (!done) return done.error().in(fmt::format("{} channel", channel_name(channel)));
+    }
+    result_.fitted = relighting_error(dataset_, result_.predicted, false);
+    result_.held_out = relighting_error(dataset_, result_.predicted, true);
+    result_.seconds = seconds();
+    return std::move(result_);
+  }
+
+ private:
+  double seconds() const {
+    return std::chrono::duration<double>(context_.clock.now() - start_).count();
+  }
+
+  Result<void> run_channel(std::size_t channel, std::stop_token stop) {
+    if (!checkpoint_.finished[channel]) {
+      auto solved = solve_channel(channel, stop);
+      if (!solved) return solved;
+    }
+    const Checkpoint::Finished& finished = *checkpoint_.finished[channel];
+    result_.material.channels[channel] = finished.coefficients;
+    result_.channels[channel] = finished.report;
+    return predict_channel(dataset_,
+                           finished.coefficients,
+                           static_cast<int>(channel),
+                           options_,
+                           context_.solver,
+                           result_.predicted,
+                           std::move(stop));
+  }
+
+  Result<void> solve_channel(std::size_t channel, std::stop_token stop) {
+    const auto problem =
+        make_channel_problem(dataset_, static_cast<int>(channel), options_, Selection::kFit);
+    if (!problem) return problem.error();
+    report_progress(channel, {});
+    ChannelSolver solver(*problem,
+                         options_,
+                         context_.solver,
+                         context_.clock,
+                         {[&](const ChannelReport& report) { report_progress(channel, report); },
+                          [&](const ChannelProgress& progress) { return save(progress); }});
+    auto progress = solver.run(std::exchange(checkpoint_.current, std::nullopt), stop);
+    if (!progress) return progress.error();
+    const ChannelReport& report = progress->report;
+    log::info("{} channel: {} iterations, chi^2/N {:.2f}, {}, {:.1f} s",
+              channel_name(channel),
+              report.history.back().iteration,
+              report.history.back().chi_squared_per_datum,
+              to_string(report.stop_reason),
+              report.seconds);
+    checkpoint_.finished[channel] = {to_coefficients(progress->state.x), report};
+    if (auto saved = save(); !saved) return saved;
+    return context_.events.fact(
+        "channel.reconstructed",
+        {{"channel", channel_name(channel)},
+         {"iterations", report.history.back().iteration},
+         {"chi_squared_per_datum", report.history.back().chi_squared_per_datum},
+         {"stop_reason", to_string(report.stop_reason)},
+         {"seconds", report.seconds}});
+  }
+
+  Result<void> save(const ChannelProgress& progress) {
+    if (context_.checkpoints == nullptr) return ok();
+    checkpoint_.current = progress;
+    auto saved = context_.checkpoints->save(checkpoint_);
+    checkpoint_.current.reset();
+    return saved;
+  }
+
+  Result<void> save() const {
+    return context_.checkpoints == nullptr ? ok() : context_.checkpoints->save(checkpoint_);
+  }
+
+  // How far a channel is: chi^2 falls about exponentially to its target, unless the limit of
+  // iterations comes first.
+  double channel_fraction(const ChannelReport& report) const {
+    if (report.history.empty()) return 0.0;
+    const IterationRecord& now = report.history.back();
+    const double target = std::max(options_.discrepancy, 1e-3);
+    const double whole = std::log(report.history.front().chi_squared_per_datum / target);
+    const double left = std::log(now.chi_squared_per_datum / target);
+    const double fallen = whole > 0.0 ? 1.0 - left / whole : 1.0;
+    const double spent = static_cast<double>(now.iteration) / std::max(options_.max_iterations, 1);
+    return std::clamp(std::max(fallen, spent), 0.05, 0.99);
+  }
+
+  void report_progress(std::size_t channel, const ChannelReport& report) {
+    Progress progress;
+    progress.step = report.history.empty() ? "homogeneous fit" : "reconstruction";
+    progress.fraction = (static_cast<double>(channel) + channel_fraction(report)) / kColorChannels;
+    if (progress.fraction > 0.0)
+      progress.seconds_left = seconds() * (1.0 / progress.fraction - 1.0);
+    progress.detail["channel"] = channel_name(channel);
+    if (!report.history.empty()) {
+      const IterationRecord& now = report.history.back();
+      progress.detail["iteration"] = now.iteration;
+      progress.detail["objective"] = now.objective;
+      progress.detail["chi_squared_per_datum"] = now.chi_squared_per_datum;
+    }
+    context_.events.progress(progress);
+  }
+
+  const Dataset& dataset_;
+  const InverseOptions& options_;
+  const InverseContext& context_;
+  std::chrono::nanoseconds start_;
+  Checkpoint checkpoint_;
+  InverseResult result_;
+};
+
+}  // namespace
+
+Result<InverseResult> reconstruct_material(const Dataset& dataset,
+                                           const InverseOptions& options,
+                                           const InverseContext& context,
+                                           std::stop_token stop) {
+  if (auto valid = validate(options); !valid) return valid.error();
+  return Reconstruction(dataset, options, context).run(std::move(stop));
+}
+
+}  // namespace opaline::reconstruct

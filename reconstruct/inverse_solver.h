@@ -1,0 +1,49 @@
+#pragma once
+
+#include <stop_token>
+
+#include "base/clock.h"
+#include "base/dataset.h"
+#include "base/events.h"
+#include "base/result.h"
+#include "reconstruct/checkpoint.h"
+#include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/inverse_options.h"
+#include "reconstruct/inverse_result.h"
+
+namespace opaline::reconstruct {
+
+/// What a reconstruction works with; all of it outlives the call.
+struct InverseContext {
+  diffusion::FluenceSolver& solver;
+  EventSink& events;
+  const Clock& clock;
+  const CheckpointStore* checkpoints = nullptr;  ///< null: none are kept
+};
+
+/// Recovers sigma_a and sigma_s' per cell and channel from pictures of a lit sample
+/// (docs/physics.md):
+///
+///   per channel: homogeneous fit -> L-BFGS on Objective over p = (log sigma_s', log sigma_a),
+///   bounded, until chi^2 <= discrepancy times the number of data (Morozov 1966, with the measured
+///   variance), or no more is to be had
+///
+/// A cancelled or killed call goes on from its last checkpoint. After each checkpoint the solves
+/// start afresh, so a run that was interrupted gives the same bits as one that was not, on the same
+/// solver.
+///
+/// Events:  progress "homogeneous fit" and "reconstruction" {channel, iteration, objective,
+/// chi_squared_per_datum};
+///          fact "channel.reconstructed" {channel, iterations, chi_squared_per_datum, stop_reason,
+///          seconds}.
+/// Threads: one call at a time per solver.
+/// Errors:  kInvalidArgument for options or a dataset that cannot be used; kCancelled; the
+/// solver's; kUnavailable when
+///          a checkpoint cannot be written. Not reaching the noise is an answer:
+///          ChannelReport::stop_reason.
+Result<InverseResult> reconstruct_material(const Dataset& dataset,
+                                           const InverseOptions& options,
+                                           const InverseContext& context,
+                                           std::stop_token stop);
+
+}  // namespace opaline::reconstruct

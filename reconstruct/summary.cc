@@ -1,0 +1,88 @@
+#include "reconstruct/summary.h"
+
+#include <nlohmann/json.hpp>
+
+#include "reconstruct/relighting_error.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json to_json(const RelightingError& e) {
+  return {{"relighting_error", e.error}, {"noise_floor", e.noise_floor}};
+}
+
+Json to_json(const CoefficientBounds& b) { return {b.lowest, b.highest}; }
+
+Json to_json(const InverseOptions& o) {
+  return {{"source", to_string(o.source)},
+          {"deposit", to_string(o.deposit)},
+          {"boundary", to_string(o.boundary)},
+          {"model_error", o.model_error},
+          {"regularization", o.regularization},
+          {"max_iterations", o.max_iterations},
+          {"tolerance", o.tolerance},
+          {"discrepancy", o.discrepancy},
+          {"stalled", o.stalled},
+          {"absorption_bounds_per_mm", to_json(o.absorption)},
+          {"reduced_scattering_bounds_per_mm", to_json(o.reduced_scattering)},
+          {"back_end", to_string(o.back_end)}};
+}
+
+Json history_json(const ChannelReport& report) {
+  Json history = Json::array();
+  for (const IterationRecord& i : report.history) {
+    history.push_back({{"iteration", i.iteration},
+                       {"objective", i.objective},
+                       {"chi_squared_per_datum", i.chi_squared_per_datum},
+                       {"regularization", i.regularization},
+                       {"solves", i.solves}});
+  }
+  return history;
+}
+
+Json to_json(const ChannelReport& r, const char* name) {
+  const HomogeneousFit& h = r.homogeneous;
+  return {{"channel", name},
+          {"homogeneous",
+           {{"reduced_scattering", h.reduced_scattering},
+            {"absorption", h.absorption},
+            {"chi_squared_per_datum", h.chi_squared / static_cast<double>(r.data_count)},
+            {"iterations", h.iterations}}},
+          {"stop_reason", to_string(r.stop_reason)},
+          {"stop_explanation", explain(r.stop_reason)},
+          {"data", r.data_count},
+          {"solves", r.solves},
+          {"seconds", r.seconds},
+          {"chi_squared_per_datum", r.history.back().chi_squared_per_datum},
+          {"history", history_json(r)}};
+}
+
+}  // namespace
+
+std::string summary_json(const Dataset& dataset,
+                         const InverseOptions& options,
+                         const InverseResult& result) {
+  Json channels = Json::array();
+  for (std::size_t c = 0; c < kColorChannels; ++c)
+    channels.push_back(to_json(result.channels[c], kChannelNames[c]));
+  Json illuminations = Json::array();
+  for (std::size_t m = 0; m < dataset.illuminations.size(); ++m) {
+    const Illumination& i = dataset.illuminations[m];
+    illuminations.push_back({{"name", i.name},
+                             {"held_out", i.held_out},
+                             {"relighting_error", relighting_error(i, result.predicted[m]).error}});
+  }
+  const Json summary{{"format", 1},
+                     {"solver", result.solver},
+                     {"seconds", result.seconds},
+                     {"fitted", to_json(result.fitted)},
+                     {"held_out", to_json(result.held_out)},
+                     {"options", to_json(options)},
+                     {"channels", std::move(channels)},
+                     {"illuminations", std::move(illuminations)}};
+  return summary.dump(2) + "\n";
+}
+
+}  // namespace opaline::reconstruct
