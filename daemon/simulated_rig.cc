@@ -3,8 +3,8 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <signal.h>
 #include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 extern "C" {  // glibc 2.36 forgets to say so itself
@@ -98,7 +98,6 @@ Result<void> wait_until_it_answers(const RigProcess& process,
     const auto ended =
         sim::wait_for(child.get(), POLLIN, std::chrono::steady_clock::now() + 20ms, stop);
     if (ended) {
-      ::waitpid(pid, nullptr, 0);
       if (answers(process)) return ok();  // somebody else was quicker
       return unavailable(
           fmt::format("opaline-rig ended at once; see {}", log_of(process).string()));
@@ -157,7 +156,9 @@ Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop)
   const auto pid = spawn(process);
   if (!pid) return pid.error();
   log::info("simulated rig: process {} at {}", *pid, process.socket.string());
-  return wait_until_it_answers(process, *pid, stop);
+  const auto running = wait_until_it_answers(process, *pid, stop);
+  if (!running) ::kill(*pid, SIGTERM);  // nobody would look after it
+  return running;
 }
 
 }  // namespace opaline::daemon

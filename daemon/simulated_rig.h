@@ -40,7 +40,8 @@ struct RigProcess {
 /// end first, so the caller holds the station's lock. The process started is nobody's child in the end: it outlives
 /// the caller, has its own session, and writes its log to SOCKET.log.
 ///
-/// Errors: kUnavailable, with the log's name, when it cannot be started or ends at once; kTimeout; kCancelled.
+/// Errors: kUnavailable, with the log's name, when it cannot be started or ends at once; kTimeout; kCancelled; after
+/// each of these none is left that was started here.
 Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop);
 
 }  // namespace opaline::daemon
