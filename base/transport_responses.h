@@ -38,7 +38,8 @@ struct TransportResponses {
   Vec3 camera_centre;       ///< the radiance is measured towards this point
   double anisotropy = 0.0;  ///< g of the Henyey-Greenstein phase function that was simulated
   std::uint64_t seed = 0;
-  std::uint64_t photons_per_patch = 0;  ///< in each channel
+  int passes = 1;                       ///< runs with seeds seed, seed + 1, ..., averaged
+  std::uint64_t photons_per_patch = 0;  ///< in each channel, all passes together
   std::string generator;                ///< program and version of the algorithm
   std::string scene;  ///< what the sample is, one line of JSON: enough to make its material again
   std::vector<PatchResponse> patches;

@@ -10,7 +10,9 @@
 namespace opaline::sim {
 namespace {
 
-constexpr int kMostIterations = 60;
+constexpr int kMostIterations = 20;
+constexpr double kSlowest = 1e-30;     // a direction component that never reaches the next voxel
+constexpr double kSmallChange = 1e-4;  // Newton's next error is its square
 
 double phase(double cosine, double g) {
   const double isotropic = 0.25 * std::numbers::inv_pi;
@@ -21,28 +23,30 @@ double phase(double cosine, double g) {
 
 }  // namespace
 
-RefractedRay refract_to_camera(double depth, double height, double lateral, double ior) {
-  RefractedRay ray;
-  double distance_squared = 0.0;
-  double sine_outside = 0.0;
-  for (int i = 0; i < kMostIterations; ++i) {  // contracts by about d / H a step
-    const double outside = lateral - ray.lateral_inside;
-    distance_squared = outside * outside + height * height;
-    sine_outside = outside / std::sqrt(distance_squared);
-    ray.sine_inside = sine_outside / ior;
-    ray.cosine_inside = std::sqrt(1.0 - ray.sine_inside * ray.sine_inside);
-    const double next = depth * ray.sine_inside / ray.cosine_inside;
-    const double change = std::abs(next - ray.lateral_inside);
-    ray.lateral_inside = next;
-    if (change <= 1e-6 * height) break;
+RefractedRay refract_to_camera(double depth, double height, double lateral_squared, double ior) {
+  const double k = depth / height;
+  const double q = lateral_squared / (height * height);
+  const double n2 = ior * ior;
+  double rho = k / (ior + k);  // exact straight above
+  for (int i = 0; i < kMostIterations; ++i) {
+    const double s = 1.0 - rho;
+    const double d2 = n2 + (n2 - 1.0) * q * s * s;
+    const double inverse = 1.0 / std::sqrt(d2);
+    const double change = (rho - k * s * inverse) / (1.0 + k * n2 * inverse * inverse * inverse);
+    rho -= change;
+    if (std::abs(change) < kSmallChange) break;
   }
-  ray.distance_outside = std::sqrt(distance_squared);
-  ray.cosine_outside = height / ray.distance_outside;
+  const double s = 1.0 - rho;
+  const double stretch = std::sqrt(1.0 + q * s * s);
+  const double d = std::sqrt(n2 + (n2 - 1.0) * q * s * s);
+  RefractedRay ray{.share_inside = rho,
+                   .cosine_inside = d / (ior * stretch),
+                   .cosine_outside = 1.0 / stretch,
+                   .distance_outside = height * stretch};
   const double ci = ray.cosine_inside;
-  const double co = ray.cosine_outside;
-  const double across = depth / ci + ior * height / co;
-  const double along = depth / (ci * ci) + ior * height * ci / (co * co * co);
-  ray.solid_angle_per_area = 1.0 / (co * across * along);
+  const double across = depth / ci + ior * height * stretch;
+  const double along = depth / (ci * ci) + ior * height * ci * stretch * stretch * stretch;
+  ray.solid_angle_per_area = stretch / (across * along);
   return ray;
 }
 
@@ -52,6 +56,7 @@ CameraConnection::CameraConnection(const LightTransportMedium& medium, Face seen
       size_{medium.block.size().x, medium.block.size().y, medium.block.size().z},
       camera_{centre.x, centre.y, centre.z},
       spacing_(medium.block.spacing()),
+      inverse_spacing_{1.0 / spacing_[0], 1.0 / spacing_[1], 1.0 / spacing_[2]},
       cells_(medium.block.cells()),
       normal_(axis_of(seen)),
       column_axis_(normal_ == 0 ? 1 : 0),
@@ -118,13 +123,10 @@ void CameraConnection::add_image(const Image& image,
   const double depth = is_max(seen_) ? size_[normal_] - image.point[normal_] : image.point[normal_];
   const double dx = camera_[column_axis_] - image.point[column_axis_];
   const double dy = camera_[row_axis_] - image.point[row_axis_];
-  const double lateral = std::sqrt(dx * dx + dy * dy);
-  const RefractedRay ray = refract_to_camera(depth, height_, lateral, medium_.ior);
-  const double unit_x = lateral > 0.0 ? dx / lateral : 1.0;
-  const double unit_y = lateral > 0.0 ? dy / lateral : 0.0;
-  double column =
-      (image.point[column_axis_] + unit_x * ray.lateral_inside) / spacing_[column_axis_];
-  double row = (image.point[row_axis_] + unit_y * ray.lateral_inside) / spacing_[row_axis_];
+  const RefractedRay ray = refract_to_camera(depth, height_, dx * dx + dy * dy, medium_.ior);
+  const double share = ray.share_inside;
+  double column = (image.point[column_axis_] + dx * share) / spacing_[column_axis_];
+  double row = (image.point[row_axis_] + dy * share) / spacing_[row_axis_];
   const int width = cells_[column_axis_];
   const int height = cells_[row_axis_];
   if (medium_.periodic_sides) {
@@ -134,10 +136,11 @@ void CameraConnection::add_image(const Image& image,
   if (column < 0.0 || row < 0.0 || column >= width || row >= height) return;
 
   std::array<double, 3> out{};  // unit direction of the unfolded ray
-  out[column_axis_] = ray.sine_inside * unit_x;
-  out[row_axis_] = ray.sine_inside * unit_y;
+  const double sine_by_distance = (1.0 - share) / (medium_.ior * ray.distance_outside);
+  out[column_axis_] = dx * sine_by_distance;
+  out[row_axis_] = dy * sine_by_distance;
   out[normal_] = is_max(seen_) ? ray.cosine_inside : -ray.cosine_inside;
-  double factor = 1.0 - reflectance(ray.cosine_inside, medium_.ior, 1.0);
+  double factor = 1.0 - reflectance_between(ray.cosine_inside, ray.cosine_outside, medium_.ior);
   double cosine = 0.0;  // of the scattering angle, towards the first mirror
   for (int axis = 0; axis < 3; ++axis) {
     const bool mirrored = (image.mirrors >> axis & 1) != 0;
@@ -155,32 +158,33 @@ void CameraConnection::add_image(const Image& image,
 double CameraConnection::transmittance(const std::array<double, 3>& from,
                                        const std::array<double, 3>& direction,
                                        double length) const {
-  // Exact for constant voxels: from plane to plane (Amanatides & Woo 1987), folding mirrored cells
-  // back.
+  // Exact for constant voxels: from plane to plane (Amanatides & Woo 1987), folding mirrored cells back.
   std::array<int, 3> cell{};
   std::array<int, 3> step{};
   std::array<double, 3> next{};
   std::array<double, 3> every{};
   for (int axis = 0; axis < 3; ++axis) {
-    const double position = from[axis] / spacing_[axis];
-    cell[axis] = static_cast<int>(std::floor(position));
-    step[axis] = direction[axis] > 0.0 ? 1 : -1;
-    const double edge = direction[axis] > 0.0 ? cell[axis] + 1.0 - position : position - cell[axis];
+    const double position = from[axis] * inverse_spacing_[axis];
+    const int truncated = static_cast<int>(position);
+    cell[axis] = position < truncated ? truncated - 1 : truncated;
+    const bool forwards = direction[axis] > 0.0;
+    step[axis] = forwards ? 1 : -1;
     const double speed = std::abs(direction[axis]);
-    every[axis] = speed > 0.0 ? spacing_[axis] / speed : std::numeric_limits<double>::max();
-    next[axis] = speed > 0.0 ? edge * every[axis] : std::numeric_limits<double>::max();
+    every[axis] = spacing_[axis] / std::max(speed, kSlowest);
+    const double edge = forwards ? cell[axis] + 1.0 - position : position - cell[axis];
+    next[axis] = speed > kSlowest ? edge * every[axis] : every[axis];
   }
   double optical_depth = 0.0;
   double at = 0.0;
-  while (at < length) {
+  while (true) {
     const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
-    const double to = std::min(next[axis], length);
-    optical_depth += (to - at) * medium_.extinction(folded_cell(cell));
-    at = to;
+    const double extinction = medium_.extinction(folded_cell(cell));
+    if (next[axis] >= length) return std::exp(-(optical_depth + (length - at) * extinction));
+    optical_depth += (next[axis] - at) * extinction;
+    at = next[axis];
     next[axis] += every[axis];
     cell[axis] += step[axis];
   }
-  return std::exp(-optical_depth);
 }
 
 std::size_t CameraConnection::folded_cell(std::array<int, 3> cell) const {

@@ -9,27 +9,26 @@
 
 namespace opaline::sim {
 
-/// The straight refracted ray from a point inside the block through a plane face to the camera's
-/// centre, with d the point's depth under the face, H the camera's height over it, and Delta their
-/// lateral distance:
+/// The refracted ray from a point inside the block through a plane face to the camera's centre. With d the point's depth
+/// under the face, H the camera's height over it, Delta their lateral distance:
 ///
 ///   Delta = d tan(i) + H tan(o),   sin(o) = n sin(i)
-///   dOmega_i / dA = 1 / [ cos(o) (d / cos(i) + n H / cos(o)) (d / cos^2(i) + n H cos(i) /
-///   cos^3(o)) ]
+///   dOmega_i / dA = 1 / [ cos(o) (d / cos(i) + n H / cos(o)) (d / cos^2(i) + n H cos(i) / cos^3(o)) ]
 ///
-/// dA is perpendicular to the ray at the camera; the product in brackets is the derivative of the
-/// ray's landing point by (phi, i), over sin(i). For a far camera it becomes cos(o) / (n^2 cos(i)
-/// r^2), the n^2 law of radiance.
+/// dA is perpendicular to the ray at the camera; the two brackets are the derivatives of the ray's landing point by
+/// azimuth and by i, the first over sin(i). For a far camera this is cos(o) / (n^2 cos(i) r^2), the n^2 law of radiance.
+///
+/// Solved for rho, the share of Delta covered inside, with s = 1 - rho, q = (Delta / H)^2, D^2 = n^2 + (n^2 - 1) q s^2:
+/// rho = (d / H) s / D by Newton's iteration; cos(o) = 1 / sqrt(1 + q s^2), cos(i) = D cos(o) / n.
 struct RefractedRay {
-  double lateral_inside = 0.0;  ///< distance on the face from above the point to the exit point, mm
-  double sine_inside = 0.0;
+  double share_inside = 0.0;  ///< rho
   double cosine_inside = 1.0;
   double cosine_outside = 1.0;
   double distance_outside = 0.0;      ///< r, exit point to camera, mm
   double solid_angle_per_area = 0.0;  ///< dOmega_i / dA, sr/mm^2
 };
 
-RefractedRay refract_to_camera(double depth, double height, double lateral, double ior);
+RefractedRay refract_to_camera(double depth, double height, double lateral_squared, double ior);
 
 /// Local estimation for one seen face and camera: what a scattering event adds to the radiance of a
 /// cell.
@@ -74,6 +73,7 @@ class CameraConnection {
   std::array<double, 3> size_;
   std::array<double, 3> camera_;
   std::array<double, 3> spacing_;
+  std::array<double, 3> inverse_spacing_;
   std::array<int, 3> cells_;
   int normal_;  // axis of the seen face
   int column_axis_;

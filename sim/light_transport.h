@@ -142,4 +142,8 @@ Result<TransportResponses> compute_responses(const Material& material,
                                              EventSink& events,
                                              std::stop_token stop);
 
+/// The average of two runs, as one with more passes: `next` continues `first` with the seed after its last, all else is
+/// the same. What was computed overnight is so made better the night after.
+Result<TransportResponses> combine(const TransportResponses& first, const TransportResponses& next);
+
 }  // namespace opaline::sim

@@ -31,6 +31,13 @@ void set_channel(Image<float>& image, const Image<double>& values, int channel) 
   }
 }
 
+void average(Image<float>& to, const Image<float>& other, double weight, double other_weight) {
+  for (std::size_t i = 0; i < to.samples().size(); ++i) {
+    to.samples()[i] =
+        static_cast<float>(weight * to.samples()[i] + other_weight * other.samples()[i]);
+  }
+}
+
 }  // namespace
 
 Result<void> validate(const ResponseOptions& options, const Material& material) {
@@ -119,6 +126,34 @@ Result<TransportResponses> compute_responses(const Material& material,
                      .detail = {{"patch", i + 1}, {"patches", count}}});
   }
   return responses;
+}
+
+Result<TransportResponses> combine(const TransportResponses& first,
+                                   const TransportResponses& next) {
+  TransportResponses expected = first;  // with what may differ taken from `next`
+  expected.seed = first.seed + first.passes;
+  expected.passes = next.passes;
+  expected.photons_per_patch = next.photons_per_patch;
+  expected.patches = next.patches;
+  if (expected != next ||
+      first.photons_per_patch * next.passes != next.photons_per_patch * first.passes) {
+    return invalid_argument(
+        fmt::format("runs of different samples, options or photons, or seeds not in sequence: {} "
+                    "passes from seed {}, then seed {}",
+                    first.passes,
+                    first.seed,
+                    next.seed));
+  }
+  TransportResponses both = first;
+  both.passes += next.passes;
+  both.photons_per_patch += next.photons_per_patch;
+  const double a = static_cast<double>(first.passes) / both.passes;
+  const double b = 1.0 - a;
+  for (std::size_t i = 0; i < both.patches.size(); ++i) {
+    average(both.patches[i].radiance, next.patches[i].radiance, a, b);
+    average(both.patches[i].variance, next.patches[i].variance, a * a, b * b);
+  }
+  return both;
 }
 
 }  // namespace opaline::sim

@@ -13,7 +13,8 @@
 namespace opaline::sim {
 namespace {
 
-constexpr std::array kKindNames{"homogeneous", "layered", "wax", "marble", "stone"};
+constexpr std::array<std::string_view, 5> kKindNames{
+    "homogeneous", "layered", "wax", "marble", "stone"};
 
 // Red, green, blue against green: white stone scatters blue a little more and absorbs it more.
 constexpr std::array<double, kColorChannels> kScatteringTint{0.92, 1.0, 1.08};

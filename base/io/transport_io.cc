@@ -107,6 +107,7 @@ nlohmann::ordered_json header_of(const TransportResponses& r, std::size_t payloa
           {"camera_centre_mm", {r.camera_centre.x, r.camera_centre.y, r.camera_centre.z}},
           {"anisotropy", r.anisotropy},
           {"seed", r.seed},
+          {"passes", r.passes},
           {"photons_per_patch", r.photons_per_patch},
           {"generator", r.generator},
           {"scene", r.scene},
@@ -141,6 +142,7 @@ Result<TransportResponses> responses_from_header(const nlohmann::json& json) {
   r.camera_centre = {centre[0], centre[1], centre[2]};
   r.anisotropy = json.at("anisotropy").get<double>();
   r.seed = json.at("seed").get<std::uint64_t>();
+  r.passes = json.value("passes", 1);
   r.photons_per_patch = json.at("photons_per_patch").get<std::uint64_t>();
   r.generator = json.at("generator").get<std::string>();
   r.scene = json.at("scene").get<std::string>();

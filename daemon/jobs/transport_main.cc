@@ -25,11 +25,14 @@ Examples:
       the demo's sample, quickly (about 1.5 % noise where it is bright)
   opaline-transport wax.transport --scene wax --scene-seed 7 --cells 32 32 8 --spacing 0.5 0.5 0.75
   opaline-transport front.transport --lit-face z_max --camera-angle 20
+  opaline-transport better.transport --combine seed_1.transport --combine seed_2.transport
+      the average of runs that differ in --seed alone, in its order
 
 Ctrl-C stops it; the file is written whole at the end or not at all.)";
 
 struct Arguments {
   std::string output;
+  std::vector<std::string> combine;
   std::string kind = "marble";
   SceneOptions scene;
   ResponseOptions responses;
@@ -87,11 +90,26 @@ void add_options(CLI::App& app, Arguments& a) {
       ->capture_default_str();
   app.add_option("--threads", a.responses.threads, "0: all processors; changes no result")
       ->capture_default_str();
+  app.add_option("--combine", a.combine, "average these files instead of computing")
+      ->allow_extra_args(false);
   app.set_version_flag("--version", std::string(opaline::daemon::version()));
   app.footer(kExamples);
 }
 
+opaline::Result<void> combine_files(const Arguments& a) {
+  auto sum = opaline::read_transport(a.combine.front());
+  for (std::size_t i = 1; sum && i < a.combine.size(); ++i) {
+    const auto next = opaline::read_transport(a.combine[i]);
+    if (!next) return next.error();
+    sum = opaline::sim::combine(*sum, *next);
+    if (!sum) return sum.error().in(a.combine[i]);
+  }
+  if (!sum) return sum.error();
+  return write_transport(opaline::system_files(), a.output, *sum);
+}
+
 opaline::Result<void> run(Arguments& a, const std::stop_token& stop) {
+  if (!a.combine.empty()) return combine_files(a);
   const auto kind = opaline::sim::scene_kind(a.kind);
   if (!kind) return kind.error();
   a.scene.kind = *kind;

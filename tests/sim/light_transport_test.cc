@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "sim/fresnel.h"
+#include "sim/light_transport_medium.h"
+#include "sim/photon_batch.h"
 
 namespace opaline::sim {
 namespace {
@@ -160,6 +162,93 @@ TEST(LightTransport, IsTheSameToTheBitForAnyNumberOfThreads) {
   EXPECT_EQ(one->radiance.mean, five->radiance.mean);
   EXPECT_EQ(one->radiance.variance, five->radiance.variance);
   EXPECT_EQ(one->exitance[kZMaxIndex].mean, five->exitance[kZMaxIndex].mean);
+}
+
+TEST(LightTransport, EstimatesItsOwnVariance) {
+  // Variance as estimated inside each run against the scatter between runs with other seeds.
+  const Block block{6, 6, 6, 0.5, 0.5, 0.5};
+  constexpr int kRuns = 24;
+  TransportOptions options{
+      .photons = 8 * kBatchPhotons,
+      .radiance = RadianceTally{Face::kZMax, camera_above(block, 100.0, 10.0)}};
+  std::vector<double> sum(36);
+  std::vector<double> square(36);
+  std::vector<double> estimated(36);
+  for (int run = 0; run < kRuns; ++run) {
+    options.seed = 100 + run;
+    const auto tally =
+        trace(block, 1.3, uniform(block, 0.01, 1.5), whole_face(block, Face::kZMin), options, {});
+    ASSERT_TRUE(tally);
+    for (std::size_t i = 0; i < 36; ++i) {
+      const double value = tally->radiance.mean.samples()[i];
+      sum[i] += value;
+      square[i] += value * value;
+      estimated[i] += tally->radiance.variance.samples()[i] / kRuns;
+    }
+  }
+  double ratio = 0.0;
+  for (std::size_t i = 0; i < 36; ++i) {
+    const double mean = sum[i] / kRuns;
+    ratio += (square[i] / kRuns - mean * mean) * kRuns / (kRuns - 1) / estimated[i] / 36;
+  }
+  // sqrt(2 / (23 x 36)) = 0.05 if cells were independent; a photon is seen in a few of them.
+  EXPECT_NEAR(ratio, 1.0, 0.25);
+}
+
+TEST(LightTransport, ShowsASymmetricSampleSymmetrically) {
+  const Block block{6, 6, 6, 0.5, 0.5, 0.5};
+  const TransportOptions options{
+      .photons = 1 << 17, .radiance = RadianceTally{Face::kZMax, camera_above(block, 100.0, 0.0)}};
+  const auto tally =
+      trace(block, 1.3, uniform(block, 0.01, 1.5), whole_face(block, Face::kZMin), options, {});
+  ASSERT_TRUE(tally);
+  const Image<double>& mean = tally->radiance.mean;
+  const Image<double>& variance = tally->radiance.variance;
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 6; ++x) {
+      const double sigma = std::sqrt(variance.at(x, y) + variance.at(5 - x, y));
+      EXPECT_NEAR(mean.at(x, y), mean.at(5 - x, y), 4.5 * sigma);
+      EXPECT_NEAR(mean.at(x, y), mean.at(y, x), 4.5 * sigma);
+    }
+  }
+}
+
+TEST(LightTransport, SeesTheSameThroughEveryFace) {
+  // A cube lit and seen through other faces is the same cube turned.
+  const Block block{4, 4, 4, 0.75, 0.75, 0.75};
+  const ChannelCoefficients coefficients = uniform(block, 0.02, 1.5);
+  const auto seen = [&](Face lit, Face face, Vec3 centre) {
+    const TransportOptions options{.photons = 1 << 16,
+                                   .stream = static_cast<std::uint64_t>(face),
+                                   .radiance = RadianceTally{face, centre}};
+    auto tally = trace(block, 1.3, coefficients, whole_face(block, lit), options, {});
+    EXPECT_TRUE(tally);
+    double sum = 0.0;
+    double variance = 0.0;
+    for (const double v : tally->radiance.mean.samples()) sum += v;
+    for (const double v : tally->radiance.variance.samples())
+      variance += 2.0 * v;  // cells are correlated
+    return TallyValue{sum, variance};
+  };
+  const TallyValue reference = seen(Face::kZMin, Face::kZMax, {1.5, 1.5, 103.0});
+  const std::array others{seen(Face::kZMax, Face::kZMin, {1.5, 1.5, -100.0}),
+                          seen(Face::kXMin, Face::kXMax, {103.0, 1.5, 1.5}),
+                          seen(Face::kYMax, Face::kYMin, {1.5, -100.0, 1.5})};
+  for (const TallyValue& other : others) {
+    EXPECT_NEAR(other.mean, reference.mean, 4.0 * std::sqrt(other.variance + reference.variance));
+  }
+}
+
+TEST(LightTransport, StepsAlikeWithAndWithoutWideVectors) {
+  const Block block{2, 3, 4, 0.5, 0.6, 0.7};
+  const LightTransportMedium medium = make_medium(block, 1.3, uniform(block, 0.1, 2.0), 0.4, false);
+  const LightEntry entry = whole_face(block, Face::kZMin);
+  BatchSums wide;
+  BatchSums portable;
+  trace_batch({medium, entry}, 7, wide);
+  trace_batch({.medium = medium, .entry = entry, .step = portable_step_function()}, 7, portable);
+  EXPECT_EQ(wide.absorbed, portable.absorbed);
+  EXPECT_EQ(wide.escaped, portable.escaped);
 }
 
 TEST(LightTransport, StopsSoonWhenAsked) {
