@@ -12,10 +12,11 @@ namespace opaline {
 /// What one entry patch on the lit face sends towards the camera, for unit irradiance E = 1 W/mm^2
 /// on that patch alone (incident, perpendicular or diffuse; the Fresnel loss at entry is inside).
 /// Light that never scattered is left out.
+/// Shapes: the seen face's cells, 3 channels; means over each cell. Neighbouring cells share photons, so sums over cells
+/// vary more than their variances add up to.
 struct PatchResponse {
-  Image<float>
-      radiance;  ///< L on the seen face's cells, 3 channels, W/(mm^2 sr); the mean over each cell
-  Image<float> variance;  ///< of that estimate, same shape: the Monte Carlo's own, >= 0
+  Image<float> radiance;  ///< L, W/(mm^2 sr)
+  Image<float> variance;  ///< of that estimate, by the Monte Carlo itself; >= 0
   bool operator==(const PatchResponse&) const = default;
 };
 

@@ -30,7 +30,7 @@ class CountingSink : public NullSink {
   int reports = 0;
 };
 
-class TransportStore : public testing::Test {
+class TransportStore : public ::testing::Test {
  protected:
   Result<TransportResponses> load(const ResponseOptions& options = tiny_options()) {
     events_.reports = 0;
