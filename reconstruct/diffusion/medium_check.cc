@@ -86,12 +86,17 @@ Result<void> validate(const SolveOptions& options) {
   return ok();
 }
 
-Result<void> check_fields(const Block& block, const FieldBatch& b, const FieldBatch& phi) {
+Result<void> check_shapes(const Block& block, const FieldBatch& b, const FieldBatch& phi) {
   if (Result<void> good = check_shape(block, b, "the right-hand side"); !good) return good;
   if (Result<void> good = check_shape(block, phi, "the fluence"); !good) return good;
   if (b.count != phi.count)
     return invalid_argument(
         fmt::format("{} right-hand sides for {} fluence fields", b.count, phi.count));
+  return ok();
+}
+
+Result<void> check_fields(const Block& block, const FieldBatch& b, const FieldBatch& phi) {
+  if (Result<void> good = check_shapes(block, b, phi); !good) return good;
   if (Result<void> good = check_finite(block, b, "the right-hand side"); !good) return good;
   return check_finite(block, phi, "the starting fluence");
 }

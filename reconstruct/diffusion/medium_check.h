@@ -12,8 +12,12 @@ Result<void> validate(const Medium& medium);
 /// Errors: kInvalidArgument when tolerance or max_iterations is out of range.
 Result<void> validate(const SolveOptions& options);
 
-/// Checks what a solve is given against the block it was prepared for: shapes, and that every value
-/// is finite. Errors: kInvalidArgument naming the field and the cell.
+/// Checks what a solve is given against the block it was prepared for.
+/// Errors: kInvalidArgument naming the shape that does not fit.
+Result<void> check_shapes(const Block& block, const FieldBatch& b, const FieldBatch& phi);
+
+/// check_shapes, and that every value is finite.
+/// Errors: kInvalidArgument naming the field and the cell.
 Result<void> check_fields(const Block& block, const FieldBatch& b, const FieldBatch& phi);
 
 }  // namespace opaline::reconstruct::diffusion

@@ -49,41 +49,59 @@ void allocate(Level& level, Parts& parts) {
   parts.sink.assign(level.cell_count(), 0.0);
 }
 
+/// f(cell, place on the wall) for the first (side 0) or last (side 1) cells along an axis.
+template <class F>
+void for_each_wall_cell(const std::array<int, 3>& cells, int axis, int side, F f) {
+  const int u = axis == 0 ? 1 : 0;
+  const int v = axis == 2 ? 1 : 2;
+  Cell c{};
+  c[axis] = side == 0 ? 0 : cells[axis] - 1;
+  std::size_t place = 0;
+  for (c[v] = 0; c[v] < cells[v]; ++c[v])
+    for (c[u] = 0; c[u] < cells[u]; ++c[u]) f(index(cells, c), c, place++);
+}
+
 void sum_diagonal(Level& level, const Parts& parts) {
   level.diagonal = parts.sink;
+  double* d = level.diagonal.data();
+  const std::size_t count = level.cell_count();
   for (int axis = 0; axis < 3; ++axis) {
+    const double* g = level.conductance[axis].data();
     const std::size_t stride = level.stride(axis);
-    for_each_cell(level.cells, [&](const Cell& c) {
-      const std::size_t at = index(level.cells, c);
-      double& sum = level.diagonal[at];
-      sum += level.conductance[axis][at];
-      if (c[axis] > 0) sum += level.conductance[axis][at - stride];
-      if (c[axis] == 0) sum += parts.wall[axis][0][wall_index(level.cells, c, axis)];
-      if (c[axis] == level.cells[axis] - 1)
-        sum += parts.wall[axis][1][wall_index(level.cells, c, axis)];
-    });
+    for (std::size_t c = 0; c < count; ++c) d[c] += g[c];
+    for (std::size_t c = stride; c < count; ++c)
+      d[c] += g[c - stride];  // 0 behind the last of a line
+    for (int side = 0; side < 2; ++side)
+      for_each_wall_cell(
+          level.cells, axis, side, [&](std::size_t at, const Cell&, std::size_t place) {
+            d[at] += parts.wall[axis][side][place];
+          });
   }
+}
+
+/// f(first cell, number of cells) for every run of cells, contiguous in memory, that have a next one along the axis.
+template <class F>
+void for_each_run(const Level& level, int axis, F f) {
+  const std::size_t stride = level.stride(axis);
+  const std::size_t line = stride * level.cells[axis];
+  for (std::size_t start = 0; start < level.cell_count(); start += line) f(start, line - stride);
 }
 
 void add_finest_axis(const Medium& medium, int axis, Level& level, Parts& parts) {
   const double h = parts.spacing[axis];
   const double area = medium.block.cell_volume() / h;
+  const double* kappa = medium.diffusion.data();
+  double* g = level.conductance[axis].data();
   const std::size_t stride = level.stride(axis);
-  const auto wall = [&](double kappa) {
-    return area / (2.0 * medium.boundary_a + h / (2.0 * kappa));
-  };
-  for_each_cell(level.cells, [&](const Cell& c) {
-    const std::size_t at = index(level.cells, c);
-    const double kappa = medium.diffusion[at];
-    const std::size_t on_wall = wall_index(level.cells, c, axis);
-    if (c[axis] == 0) parts.wall[axis][0][on_wall] = wall(kappa);
-    if (c[axis] == level.cells[axis] - 1) {
-      parts.wall[axis][1][on_wall] = wall(kappa);
-    } else {
-      const double next = medium.diffusion[at + stride];
-      level.conductance[axis][at] = area / h * 2.0 * kappa * next / (kappa + next);
-    }
+  for_each_run(level, axis, [&](std::size_t first, std::size_t count) {
+    for (std::size_t c = first; c < first + count; ++c)
+      g[c] = area / h * 2.0 * kappa[c] * kappa[c + stride] / (kappa[c] + kappa[c + stride]);
   });
+  for (int side = 0; side < 2; ++side)
+    for_each_wall_cell(
+        level.cells, axis, side, [&](std::size_t at, const Cell&, std::size_t place) {
+          parts.wall[axis][side][place] = area / (2.0 * medium.boundary_a + h / (2.0 * kappa[at]));
+        });
 }
 
 std::pair<Level, Parts> finest(const Medium& medium) {
@@ -109,86 +127,119 @@ std::array<int, 3> choose_ratio(const Level& level, const Parts& parts) {
   return ratio;
 }
 
-/// Resistances along one grid line through cell c, as seen from its aggregate's centre, for an axis
-/// of ratio 2.
-class Line {
- public:
-  Line(const Level& level, const Parts& parts, int axis)
-      : level_(level), parts_(parts), axis_(axis), stride_(level.stride(axis)) {}
-
-  /// From the centre of c's aggregate to c: half the link between the two cells, nothing when c is
-  /// alone.
-  double inner(const Cell& c) const {
-    const int first = c[axis_] / 2 * 2;
-    if (first + 1 >= level_.cells[axis_]) return 0.0;
-    const std::size_t at = index(level_.cells, c) - (c[axis_] - first) * stride_;
-    return 0.5 / level_.conductance[axis_][at];
-  }
-  /// From c through its face to aggregate or surface outside, on the given side, to the centre
-  /// there.
-  double outer(const Cell& c, bool forward) const {
-    const int last = level_.cells[axis_] - 1;
-    if (c[axis_] == (forward ? last : 0))
-      return 1.0 / parts_.wall[axis_][forward ? 1 : 0][wall_index(level_.cells, c, axis_)];
-    Cell next = c;
-    next[axis_] += forward ? 1 : -1;
-    const std::size_t face = index(level_.cells, forward ? c : next);
-    return 1.0 / level_.conductance[axis_][face] + inner(next);
-  }
-
- private:
-  const Level& level_;
-  const Parts& parts_;
-  int axis_;
-  std::size_t stride_;
+/// Fine cells in step along one axis of ratio 2, each the last of its aggregate: first, first + step, ...
+struct FaceRun {
+  std::size_t first;
+  std::size_t step;
+  int count;
+  bool paired;           ///< whether the aggregates beyond have two cells
+  std::size_t coarse;    ///< the first one's aggregate
+  int cells_per_coarse;  ///< steps that stay in one aggregate
 };
 
-/// The weights w of Level::transfer; where jumps of kappa make them add up to more than one they
-/// share one.
-void weigh_transfer(Level& level, const Parts& parts) {
-  std::vector<double> sum(level.cell_count(), 0.0);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (level.ratio[axis] == 1) continue;
-    level.transfer[axis].assign(level.cell_count(), 0.0);
-    const Line line(level, parts, axis);
-    for_each_cell(level.cells, [&](const Cell& c) {
-      const std::size_t at = index(level.cells, c);
-      const double inner = line.inner(c);
-      level.transfer[axis][at] = inner / (inner + line.outer(c, c[axis] % 2 == 1));
-      sum[at] += level.transfer[axis][at];
-    });
+/// Weights of both cells at each face of a run, and the conductance between the centres on either side.
+void coarsen_run(
+    const FaceRun& run, std::size_t stride, const double* g, double* weight, double* coarse) {
+  for (int n = 0; n < run.count; ++n) {
+    const std::size_t at = run.first + n * run.step;
+    const double before = 0.5 / g[at - stride];
+    const double after = run.paired ? 0.5 / g[at + stride] : 0.0;
+    const double series = 1.0 / (before + 1.0 / g[at] + after);
+    weight[at] = before * series;
+    weight[at + stride] = after * series;
+    coarse[run.coarse + n / run.cells_per_coarse] += series;
   }
-  for (auto& weights : level.transfer)
-    for (std::size_t c = 0; c < weights.size(); ++c) weights[c] /= std::max(1.0, sum[c]);
+}
+
+/// Calls f(FaceRun) for all faces between aggregates along an axis.
+template <class F>
+void for_each_face_run(const Level& fine, const Level& coarse, int axis, F f) {
+  const int n = fine.cells[axis];
+  const int faces = (n - 1) / 2;
+  const std::array<int, 3>& ratio = fine.ratio;
+  for (int v = 0; v < fine.cells[axis == 2 ? 1 : 2]; ++v) {
+    if (axis == 0) {
+      for (int j = 0; j < fine.cells[1]; ++j) {
+        const std::size_t row = index(fine.cells, {0, j, v});
+        const std::size_t above = index(coarse.cells, {0, j / ratio[1], v / ratio[2]});
+        const int full = std::max(0, n % 2 == 0 ? faces : faces - 1);
+        f(FaceRun{row + 1, 2, full, true, above, 1});
+        if (full < faces) f(FaceRun{row + n - 2, 2, 1, false, above + full, 1});
+      }
+      continue;
+    }
+    for (int face = 0; face < faces; ++face) {
+      const Cell first = axis == 1 ? Cell{0, 2 * face + 1, v} : Cell{0, v, 2 * face + 1};
+      const Cell above{0, first[1] / ratio[1], first[2] / ratio[2]};
+      f(FaceRun{index(fine.cells, first),
+                1,
+                fine.cells[0],
+                2 * face + 3 < n,
+                index(coarse.cells, above),
+                ratio[0]});
+    }
+  }
 }
 
 Cell parent_of(const Cell& c, const std::array<int, 3>& ratio) {
   return {c[0] / ratio[0], c[1] / ratio[1], c[2] / ratio[2]};
 }
 
-/// Adds the fine lines' share to the coarse conductances and walls of one axis.
-void coarsen_axis(const Level& fine, const Parts& from, int axis, Level& coarse, Parts& parts) {
-  const Line line(fine, from, axis);
+/// The surface's share: half the link inside the aggregate in series with the fine wall.
+void coarsen_walls(Level& fine, const Parts& from, int axis, const Level& coarse, Parts& parts) {
   const bool paired = fine.ratio[axis] == 2;
-  const auto series = [&](const Cell& c, bool forward) {
-    if (paired) return 1.0 / (line.inner(c) + line.outer(c, forward));
-    const int last = fine.cells[axis] - 1;
-    if (c[axis] == (forward ? last : 0))
-      return from.wall[axis][forward ? 1 : 0][wall_index(fine.cells, c, axis)];
-    return fine.conductance[axis][index(fine.cells, c)];
-  };
-  for_each_cell(fine.cells, [&](const Cell& c) {
-    const Cell above = parent_of(c, fine.ratio);
-    if (c[axis] == 0)
-      parts.wall[axis][0][wall_index(coarse.cells, above, axis)] += series(c, false);
-    if (c[axis] == fine.cells[axis] - 1)
-      parts.wall[axis][1][wall_index(coarse.cells, above, axis)] += series(c, true);
-    else if (!paired || c[axis] % 2 == 1)
-      coarse.conductance[axis][index(coarse.cells, above)] += series(c, true);
-  });
+  const std::size_t stride = fine.stride(axis);
+  const std::vector<double>& g = fine.conductance[axis];
+  for (int side = 0; side < 2; ++side)
+    for_each_wall_cell(
+        fine.cells, axis, side, [&](std::size_t at, const Cell& c, std::size_t place) {
+          const bool alone = !paired || fine.cells[axis] == 1 || (side == 1 && c[axis] % 2 == 0);
+          const double inner = alone ? 0.0 : 0.5 / g[side == 0 ? at : at - stride];
+          const double series = 1.0 / (inner + 1.0 / from.wall[axis][side][place]);
+          if (paired && !alone) fine.transfer[axis][at] = inner * series;
+          parts.wall[axis][side][wall_index(coarse.cells, parent_of(c, fine.ratio), axis)] +=
+              series;
+        });
 }
 
-std::pair<Level, Parts> coarsen(const Level& fine, const Parts& from) {
+void add_to_parents(const Level& fine,
+                    const Level& coarse,
+                    const std::vector<double>& values,
+                    double* sums) {
+  const double* value = values.data();
+  for (int k = 0; k < fine.cells[2]; ++k)
+    for (int j = 0; j < fine.cells[1]; ++j) {
+      double* row = sums + index(coarse.cells, {0, j / fine.ratio[1], k / fine.ratio[2]});
+      for (int i = 0; i < fine.cells[0]; ++i) row[i / fine.ratio[0]] += *value++;
+    }
+}
+
+/// Fills the fine level's transfer weights and the coarse conductances and walls of one axis.
+void coarsen_axis(Level& fine, const Parts& from, int axis, Level& coarse, Parts& parts) {
+  const double* g = fine.conductance[axis].data();
+  double* below = coarse.conductance[axis].data();
+  if (fine.ratio[axis] == 2) {
+    fine.transfer[axis].assign(fine.cell_count(), 0.0);
+    for_each_face_run(fine, coarse, axis, [&](const FaceRun& run) {
+      coarsen_run(run, fine.stride(axis), g, fine.transfer[axis].data(), below);
+    });
+  } else {
+    add_to_parents(fine, coarse, fine.conductance[axis], below);
+  }
+  coarsen_walls(fine, from, axis, coarse, parts);
+}
+
+/// Where jumps of kappa make the weights of a cell add up to more than one they share one.
+void bound_weights(Level& level) {
+  std::vector<double> sum(level.cell_count(), 0.0);
+  for (const auto& weights : level.transfer)
+    for (std::size_t c = 0; c < weights.size(); ++c) sum[c] += weights[c];
+  if (*std::max_element(sum.begin(), sum.end()) <= 1.0) return;
+  for (auto& weights : level.transfer)
+    for (std::size_t c = 0; c < weights.size(); ++c) weights[c] /= std::max(1.0, sum[c]);
+}
+
+std::pair<Level, Parts> coarsen(Level& fine, const Parts& from) {
   std::pair<Level, Parts> made;
   auto& [coarse, parts] = made;
   for (int axis = 0; axis < 3; ++axis) {
@@ -196,10 +247,9 @@ std::pair<Level, Parts> coarsen(const Level& fine, const Parts& from) {
     parts.spacing[axis] = from.spacing[axis] * fine.ratio[axis];
   }
   allocate(coarse, parts);
-  for_each_cell(fine.cells, [&](const Cell& c) {
-    parts.sink[index(coarse.cells, parent_of(c, fine.ratio))] += from.sink[index(fine.cells, c)];
-  });
+  add_to_parents(fine, coarse, from.sink, parts.sink.data());
   for (int axis = 0; axis < 3; ++axis) coarsen_axis(fine, from, axis, coarse, parts);
+  bound_weights(fine);
   sum_diagonal(coarse, parts);
   return made;
 }
@@ -211,7 +261,6 @@ std::vector<Level> build_levels(const Medium& medium) {
   auto [level, parts] = finest(medium);
   while (level.cell_count() > 1) {
     level.ratio = choose_ratio(level, parts);
-    weigh_transfer(level, parts);
     auto next = coarsen(level, parts);
     levels.push_back(std::move(level));
     level = std::move(next.first);

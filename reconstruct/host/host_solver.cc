@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <thread>
 
 #include "reconstruct/diffusion/conjugate_gradient.h"
 #include "reconstruct/diffusion/medium_check.h"
-#include "reconstruct/diffusion/reference_solver.h"
 #include "reconstruct/host/host_passes.h"
 
 namespace opaline::reconstruct::host {
@@ -39,6 +39,17 @@ void merge(SolveSummary& all, const SolveSummary& group) {
   all.iterations = iterations;
 }
 
+/// The sum of f over the values, in four chains so that additions overlap.
+template <class F>
+double sum_of(const double* values, std::size_t count, F f) {
+  std::array<double, 4> sums{};
+  std::size_t n = 0;
+  for (; n + 4 <= count; n += 4)
+    for (std::size_t chain = 0; chain < 4; ++chain) sums[chain] += f(values[n + chain]);
+  for (; n < count; ++n) sums[0] += f(values[n]);
+  return sums[0] + sums[1] + sums[2] + sums[3];
+}
+
 class HostSolver final : public diffusion::FluenceSolver {
  public:
   explicit HostSolver(const HostOptions& options) : team_(thread_count(options)) {}
@@ -58,14 +69,17 @@ class HostSolver final : public diffusion::FluenceSolver {
                              std::stop_token stop) override {
     if (!grid_) return invalid_argument("solve before a successful prepare");
     if (Result<void> good = validate(options); !good) return good.error();
-    if (Result<void> good = check_fields(block_, b, phi); !good) return good.error();
-    const std::vector<double> norms = diffusion::norms_and_trivial(b, phi);
-    const bool dark =
-        std::all_of(phi.values.begin(), phi.values.end(), [](double v) { return v == 0.0; });
+    if (Result<void> good = check_shapes(block_, b, phi); !good) return good.error();
+    const Survey seen = survey(b, phi);
+    if (!seen.finite) {
+      if (Result<void> good = check_fields(block_, b, phi); !good) return good.error();
+      return invalid_argument("a right-hand side's norm is out of range");
+    }
     SolveSummary all{Termination::kConverged, 0, 0.0, "no right-hand side"};
     for (int first = 0; first < b.count; first += kWidths.back()) {
       const int count = std::min(kWidths.back(), b.count - first);
-      const Group group{b, phi, first, count, std::span(norms).subspan(first, count), dark};
+      const Group group{
+          b, phi, first, count, std::span(seen.norms).subspan(first, count), seen.dark};
       const SolveSummary summary = solve_group(group, options, stop);
       if (summary.termination == Termination::kCancelled) return cancelled(summary.message);
       merge(all, summary);
@@ -78,6 +92,31 @@ class HostSolver final : public diffusion::FluenceSolver {
   }
 
  private:
+  /// What one look at all values tells.
+  struct Survey {
+    std::vector<double> norms;  ///< ||b||^2
+    bool finite = true;
+    bool dark = true;  ///< phi is zero, everywhere
+  };
+
+  /// Also sets phi to zero where b is: there the answer is known.
+  Survey survey(const FieldBatch& b, FieldBatch& phi) {
+    Survey seen{std::vector<double>(b.count, 0.0)};
+    std::vector<double> light(b.count, 0.0);
+    team_.run([&](int thread) {
+      for (int m = thread; m < b.count; m += team_.size()) {
+        seen.norms[m] = sum_of(b.field(m), b.cells, [](double v) { return v * v; });
+        light[m] = sum_of(phi.field(m), phi.cells, [](double v) { return std::abs(v); });
+        if (seen.norms[m] == 0.0 && light[m] > 0.0) std::fill_n(phi.field(m), phi.cells, 0.0);
+      }
+    });
+    for (int m = 0; m < b.count; ++m) {
+      seen.finite = seen.finite && std::isfinite(seen.norms[m]) && std::isfinite(light[m]);
+      seen.dark = seen.dark && light[m] == 0.0;
+    }
+    return seen;
+  }
+
   SolveSummary solve_group(const Group& group,
                            const SolveOptions& options,
                            const std::stop_token& stop) {
