@@ -137,9 +137,10 @@ struct FaceRun {
   int cells_per_coarse;  ///< steps that stay in one aggregate
 };
 
-/// Weights of both cells at each face of a run, and the conductance between the centres on either side.
+/// Weights of both cells at each face of a run, and the face's share of the conductance between the aggregates.
 void coarsen_run(
     const FaceRun& run, std::size_t stride, const double* g, double* weight, double* coarse) {
+  const double distance = run.paired ? 2.0 : 1.5;  // between the centres, in fine cells
   for (int n = 0; n < run.count; ++n) {
     const std::size_t at = run.first + n * run.step;
     const double before = 0.5 / g[at - stride];
@@ -147,7 +148,7 @@ void coarsen_run(
     const double series = 1.0 / (before + 1.0 / g[at] + after);
     weight[at] = before * series;
     weight[at + stride] = after * series;
-    coarse[run.coarse + n / run.cells_per_coarse] += series;
+    coarse[run.coarse + n / run.cells_per_coarse] += g[at] / distance;
   }
 }
 

@@ -74,25 +74,30 @@ TEST(HostSolver, ServesOneMediumAfterAnother) {
     }
 }
 
-// The promise is 100 ms on a quiet machine; ten times that leaves room for sanitizers on a busy one.
-TEST(HostSolver, StopsSoonAfterItIsAskedTo) {
-  const Block block{64, 64, 64, 0.5, 0.5, 0.5};
+// The promise, 100 ms on a quiet machine, holds because the token is looked at once an iteration: four of them at most
+// (the one under way and what the clock may be off on a busy machine), as long as they were measured here to take.
+TEST(HostSolver, StopsWithinAnIterationOrTwo) {
+  using Clock = std::chrono::steady_clock;
+  const Block block{40, 40, 40, 0.5, 0.5, 0.5};
   const auto host = make_host_solver({.threads = 2});
   ASSERT_TRUE(host->prepare(random_medium(block, 1e6, 4)));
-  const FieldBatch b = random_fields(block, 16, 5);
+  const FieldBatch b = random_fields(block, 4, 5);
   FieldBatch phi(b.cells, b.count);
+  const Clock::time_point begin = Clock::now();
+  ASSERT_TRUE(host->solve(b, phi, {1e-14, 5}, {}));
+  const auto iteration = (Clock::now() - begin) / 5;
   std::stop_source stop;
-  std::chrono::steady_clock::time_point asked;
+  Clock::time_point asked;
   std::jthread asker([&] {
-    std::this_thread::yield();
-    asked = std::chrono::steady_clock::now();
+    asked = Clock::now();
     stop.request_stop();
   });
-  const Result<SolveSummary> solved = host->solve(b, phi, {1e-14, 1000}, stop.get_token());
+  const Result<SolveSummary> solved = host->solve(b, phi, {1e-14, 100000}, stop.get_token());
+  const Clock::time_point returned = Clock::now();
   asker.join();
   ASSERT_FALSE(solved);
   EXPECT_EQ(solved.error().code, ErrorCode::kCancelled);
-  EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(1));
+  EXPECT_LT(returned - asked, 4 * iteration + std::chrono::milliseconds(500));
 }
 
 TEST(HostSolver, RefusesAnImpossibleNumberOfThreads) {
