@@ -14,6 +14,12 @@
 namespace opaline {
 namespace {
 
+/// Our pictures are small and our threads have owners: the libraries use the calling thread alone.
+void use_calling_thread() {
+  static const bool done = OIIO::attribute("threads", 1) && OIIO::attribute("exr_threads", -1);
+  static_cast<void>(done);
+}
+
 /// Written into every file in place of the time of writing, which would make equal images differ.
 constexpr const char* kNoDate = "1970:01:01 00:00:00";
 
@@ -223,6 +229,7 @@ Result<ImageFile> decode(std::span<const std::byte> bytes,
 
 Result<std::vector<std::byte>> encode_image(const ImageFile& image, ImageFormat format) {
   try {
+    use_calling_thread();
     return std::visit([&](const auto& pixels) { return encode(image, pixels, format); },
                       image.pixels);
   } catch (const std::exception& failure) {
@@ -238,6 +245,7 @@ Result<ImageFile> decode_image(std::span<const std::byte> bytes, const ImageLimi
   const std::optional<ImageFormat> format = detect(bytes);
   if (!format) return invalid_argument("not a PNG, TIFF or EXR file");
   try {
+    use_calling_thread();
     return decode(bytes, *format, limits);
   } catch (const std::exception& failure) {
     return invalid_argument(fmt::format("{}: {}", name_of(*format).spoken, failure.what()));
