@@ -32,7 +32,6 @@ class PhotonBatch {
     constants_.anisotropy = static_cast<float>(medium_.anisotropy);
     constants_.periodic_sides = medium_.periodic_sides;
     constants_.voxels = medium_.voxels.data();
-    lanes_ = {};
     for (auto& word : lanes_.random) {
       for (std::uint32_t& lane : word) lane = static_cast<std::uint32_t>(random_.next() >> 32);
     }
@@ -194,7 +193,7 @@ class PhotonBatch {
   BatchSums& sums_;
   SplitMix random_;
   StepConstants constants_{};
-  PhotonLanes lanes_;
+  PhotonLanes lanes_{};
   std::uint64_t emitted_ = 0;
   int living_ = 0;
 };
