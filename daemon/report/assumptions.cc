@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include "daemon/report/report_data.h"
+
+namespace opaline::daemon {
+namespace {
+
+std::string boundary(reconstruct::diffusion::BoundaryModel model) {
+  using reconstruct::diffusion::BoundaryModel;
+  switch (model) {
+    case BoundaryModel::kTwoMoment:
+      return "two_moment: partial currents with both Fresnel moments (Haskell et al. 1994)";
+    case BoundaryModel::kJensen:
+      return "jensen: A = (1 + Fdr) / (1 - Fdr) (Jensen et al. 2001)";
+    case BoundaryModel::kKeijzer:
+      return "keijzer: closed form (Keijzer et al. 1988)";
+  }
+  return "";
+}
+
+std::string source(const reconstruct::InverseOptions& options) {
+  using reconstruct::diffusion::SourceModel;
+  return options.source == SourceModel::kCollimated
+             ? "collimated: first scattering along the perpendicular ray"
+             : "surface: diffuse light enters at the boundary";
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& data) {
+  const reconstruct::InverseOptions& options = data.config.reconstruction;
+  const Vec3 size = data.dataset.block.size();
+  return {
+      {"Equation", "diffusion (P1) of each colour channel by itself, steady light"},
+      {"Sample",
+       fmt::format("a block of {} x {} x {} mm with smooth faces", size.x, size.y, size.z)},
+      {"Refractive index", fmt::format("{}, the same throughout, as given", data.dataset.ior)},
+      {"Boundary", boundary(options.boundary)},
+      {"Light source", source(options)},
+      {"Light enters by", std::string(to_string(data.dataset.lit_face))},
+      {"Camera sees", std::string(to_string(data.dataset.seen_face))},
+      {"Model error",
+       fmt::format("{} % of each datum, on top of its measured noise",
+                   100.0 * options.model_error)},
+      {"Smoothness", fmt::format("weight {}", options.regularization)},
+      {"Calibration",
+       data.config.rig.is_simulated() ? "of a simulated station, read from the rig file"
+                                      : "read from the rig file, not measured in this session"},
+      {"Unscattered light", "left out: it is not part of the diffuse light"},
+  };
+}
+
+}  // namespace opaline::daemon

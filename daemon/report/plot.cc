@@ -1,0 +1,222 @@
+#include "daemon/report/plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "daemon/report/external_program.h"
+
+namespace opaline::daemon {
+namespace {
+
+constexpr std::chrono::seconds kDeadline{30};
+// Viridis (van der Walt and Smith 2015) and a diverging scale, by their stops.
+constexpr std::string_view kSequential =
+    R"(set palette defined (0 "#440154", 1 "#46327e", 2 "#365c8d", 3 "#277f8e", 4 "#1fa187", 5 "#4ac16d", 6 "#a0da39", 7 "#fde725"))";
+constexpr std::string_view kDiverging =
+    R"(set palette defined (0 "#2166ac", 1 "#67a9cf", 2 "#d1e5f0", 3 "#f7f7f7", 4 "#fddbc7", 5 "#ef8a62", 6 "#b2182b"))";
+
+/// A gnuplot string.
+std::string gnuplot_string(std::string_view text) {
+  std::string out = "'";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) continue;
+    out += c;
+    if (c == '\'') out += c;
+  }
+  return out + "'";
+}
+
+std::string gnuplot_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.6g}", value) : "NaN";
+}
+
+std::string preamble(std::string_view name, int width, int height) {
+  return fmt::format(
+      "set terminal svg size {},{} dynamic standalone noenhanced font 'sans-serif,12' name {}\n"
+      "set encoding utf8\nset datafile missing 'NaN'\nset border lc rgb 'black'\n",
+      width,
+      height,
+      gnuplot_string(name));
+}
+
+/// The SVG element without the XML declaration before it.
+Result<std::string> run_gnuplot(const std::string& script, std::stop_token stop) {
+  auto svg = run_program({"gnuplot", "-"}, script, kDeadline, std::move(stop));
+  if (!svg && svg.error().code == ErrorCode::kUnavailable) {
+    return unavailable(svg.error().message +
+                       "; the report's plots need it: apt install gnuplot-nox");
+  }
+  if (!svg) return svg.error();
+  const std::size_t begin = svg->find("<svg");
+  if (begin == std::string::npos) return internal_error("gnuplot drew nothing");
+  return svg->substr(begin);
+}
+
+std::string level_line(double level, const std::string& title) {
+  if (!(level > 0.0)) return "";
+  return fmt::format(
+      ", {} with lines dashtype 2 lw 1.5 lc rgb '#888888' title {}", level, gnuplot_string(title));
+}
+
+std::string axes(const std::string& x_label, const std::string& y_label) {
+  return fmt::format("set xlabel {}\nset ylabel {}\nset grid lc rgb '#bbbbbb' lw 0.5\n",
+                     gnuplot_string(x_label),
+                     gnuplot_string(y_label));
+}
+
+std::string matrix(const Image<float>& values) {
+  std::string text;
+  for (int y = 0; y < values.height(); ++y) {
+    for (int x = 0; x < values.width(); ++x) {
+      text += gnuplot_number(values.at(x, y));
+      text += x + 1 < values.width() ? ' ' : '\n';
+    }
+  }
+  return text;
+}
+
+/// Where panel `index` lies, as shares of the whole drawing; the scale has the right margin.
+std::string placement(const MapPlot& plot, int index, int width, int height) {
+  const int rows = (static_cast<int>(plot.panels.size()) + plot.columns - 1) / plot.columns;
+  const int column = index % plot.columns;
+  const int row = index / plot.columns;
+  const double left = column * plot.panel_width + 46.0;
+  const double bottom = (rows - 1 - row) * plot.panel_height + 38.0;
+  return fmt::format(
+      "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
+      "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n",
+      left / width,
+      (left + plot.panel_width - 62.0) / width,
+      bottom / height,
+      (bottom + plot.panel_height - 62.0) / height);
+}
+
+std::string panel_script(const MapPlot& plot, int index) {
+  const MapPanel& panel = plot.panels[index];
+  const double sx = panel.pixel_width;
+  const double sy = panel.pixel_height;
+  return fmt::format(
+      "set title {} offset 0,-0.6\nset xlabel {} offset 0,0.6\nset ylabel {} offset 1,0\n"
+      "set xrange [0:{}]\nset yrange [0:{}]\n"
+      "plot $panel{} matrix using (($1+0.5)*{}):(($2+0.5)*{}):3 with image notitle\n",
+      gnuplot_string(panel.title),
+      gnuplot_string(panel.x_label),
+      gnuplot_string(panel.y_label),
+      panel.values.width() * sx,
+      panel.values.height() * sy,
+      index,
+      sx,
+      sy);
+}
+
+/// The colour scale, as a narrow map of its own at the right.
+std::string scale_script(const MapPlot& plot, int width, int height) {
+  const double left = width - 96.0;
+  const double tall = std::min(plot.panel_height * 1.6, height - 76.0);
+  return fmt::format(
+      "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
+      "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n"
+      "unset title\nunset xlabel\nunset ylabel\nunset xtics\nunset ytics\n"
+      "set y2tics out nomirror\nset y2label {} offset 0,0\n"
+      "set xrange [0:1]\nset yrange [{}:{}]\nset y2range [{}:{}]\n"
+      "set isosamples 2,128\nset samples 2,128\n"
+      "plot '++' using 1:2:2 with image notitle\n",
+      left / width,
+      (left + 16.0) / width,
+      (height - tall) / 2 / height,
+      (height + tall) / 2 / height,
+      gnuplot_string(plot.scale_label),
+      plot.lowest,
+      plot.highest,
+      plot.lowest,
+      plot.highest);
+}
+
+}  // namespace
+
+Result<std::string> draw(const CurvePlot& plot, std::string_view name, std::stop_token stop) {
+  std::string script = preamble(name, 720, 340) + axes(plot.x_label, plot.y_label);
+  if (plot.log_y) script += "set logscale y\nset format y '%g'\n";
+  script += "set key outside right top\n";
+  for (std::size_t s = 0; s < plot.series.size(); ++s) {
+    script += fmt::format("$series{} << EOD\n", s);
+    for (std::size_t i = 0; i < plot.series[s].x.size(); ++i) {
+      script += fmt::format(
+          "{} {}\n", gnuplot_number(plot.series[s].x[i]), gnuplot_number(plot.series[s].y[i]));
+    }
+    script += "EOD\n";
+  }
+  std::string curves;
+  for (std::size_t s = 0; s < plot.series.size(); ++s) {
+    curves += fmt::format("{}$series{} using 1:2 with lines lw 2 lc rgb '{}' title {}",
+                          s == 0 ? "" : ", ",
+                          s,
+                          plot.series[s].color,
+                          gnuplot_string(plot.series[s].title));
+  }
+  script += "plot " + curves + level_line(plot.level, plot.level_title) + "\n";
+  return run_gnuplot(script, std::move(stop));
+}
+
+Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_token stop) {
+  std::string script = preamble(name, 960, 340) + axes("", plot.y_label);
+  script +=
+      "set style data histograms\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.85 noborder\nset xtics rotate by -45 nomirror font ',10'\n"
+      "set key outside right top\nset yrange [0:*]\nunset grid\nset grid y\n$bars << EOD\n";
+  for (std::size_t g = 0; g < plot.groups.size(); ++g) {
+    script += fmt::format("\"{}\"", plot.groups[g]);
+    for (const Series& series : plot.series) script += " " + gnuplot_number(series.y[g]);
+    script += "\n";
+  }
+  script += "EOD\nplot ";
+  for (std::size_t s = 0; s < plot.series.size(); ++s) {
+    script += fmt::format("{}$bars using {}:xtic(1) lc rgb '{}' title {}",
+                          s == 0 ? "" : ", ",
+                          s + 2,
+                          plot.series[s].color,
+                          gnuplot_string(plot.series[s].title));
+  }
+  script += level_line(plot.level, plot.level_title) + "\n";
+  return run_gnuplot(script, std::move(stop));
+}
+
+Result<std::string> draw(const MapPlot& plot, std::string_view name, std::stop_token stop) {
+  const int panels = static_cast<int>(plot.panels.size());
+  const int rows = (panels + plot.columns - 1) / plot.columns;
+  const int width = plot.columns * plot.panel_width + 100;
+  const int height = rows * plot.panel_height + 8;
+  std::string script = preamble(name, width, height);
+  script += plot.diverging ? kDiverging : kSequential;
+  script += fmt::format("\nset cbrange [{}:{}]\nunset colorbox\nunset key\nset tics out nomirror\n",
+                        plot.lowest,
+                        plot.highest);
+  for (int i = 0; i < panels; ++i) {
+    script += fmt::format("$panel{} << EOD\n{}EOD\n", i, matrix(plot.panels[i].values));
+  }
+  script += "set multiplot\n";
+  for (int i = 0; i < panels; ++i) {
+    script += placement(plot, i, width, height) + panel_script(plot, i);
+  }
+  script += scale_script(plot, width, height) + "unset multiplot\n";
+  return run_gnuplot(script, std::move(stop));
+}
+
+Result<std::string> draw(const ScalePlot& plot, std::string_view name, std::stop_token stop) {
+  const std::string script =
+      preamble(name, 420, 64) + std::string(kDiverging) +
+      fmt::format(
+          "\nset cbrange [{0}:{1}]\nset xrange [{0}:{1}]\nset yrange [0:1]\n"
+          "unset colorbox\nunset key\nunset ytics\nset xtics out nomirror\nset xlabel {2}\n"
+          "set lmargin 2\nset rmargin 2\nset tmargin 0.2\nset samples 128,2\nset isosamples 128,2\n"
+          "plot '++' using 1:2:1 with image notitle\n",
+          plot.lowest,
+          plot.highest,
+          gnuplot_string(plot.label));
+  return run_gnuplot(script, std::move(stop));
+}
+
+}  // namespace opaline::daemon

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/dataset.h"
+#include "base/material.h"
+#include "config/session_config.h"
+#include "daemon/report/error_sums.h"
+#include "daemon/report/hdr_picture.h"
+#include "daemon/report/relighting.h"
+#include "daemon/report/stage_times.h"
+
+namespace opaline::daemon {
+
+/// A light's HDR picture, made small.
+struct ContactPicture {
+  std::string name;
+  Image<float> radiance;
+  Image<std::uint8_t> saturated;
+  double saturated_share = 0.0;  ///< of all pixels
+};
+
+/// Everything the report and results.json show.
+struct ReportData {
+  std::string session_id;
+  std::string generator;  ///< "opaline-preview 0.1.0"
+  config::SessionConfig config;
+  Dataset dataset;
+  Material material;
+  std::optional<Material> truth;  ///< of a simulated sample
+  nlohmann::json reconstruction;  ///< reconstruction.json
+  std::vector<ContactPicture> contacts;
+  std::vector<RelitLight> lights;  ///< the held-out ones
+  std::vector<SurfaceFit> fits;    ///< all
+  std::optional<ChannelErrors> bssrdf;
+  std::string bssrdf_absent;  ///< why there is no BSSRDF error
+  SessionFacts facts;
+  std::string solver;
+  std::string renderer;
+  double white = 1.0;  ///< radiance shown as white
+
+  /// Over all held-out lights.
+  ChannelErrors relighting() const {
+    ChannelErrors sum;
+    for (const RelitLight& light : lights) sum.add(light.errors);
+    return sum;
+  }
+};
+
+/// What was taken for granted, as (what, value).
+std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& data);
+
+}  // namespace opaline::daemon

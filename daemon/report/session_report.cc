@@ -1,0 +1,253 @@
+#include "daemon/report/session_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "base/event_log.h"
+#include "base/io/dataset_io.h"
+#include "base/io/image_io.h"
+#include "base/io/transport_io.h"
+#include "base/io/volume_io.h"
+#include "daemon/jobs/version.h"
+#include "daemon/report/bssrdf.h"
+#include "daemon/report/picture.h"
+#include "daemon/report/report_data.h"
+#include "daemon/report/report_page.h"
+#include "daemon/report/results.h"
+#include "reconstruct/host/host_solver.h"
+#include "render/renderer.h"
+#include "render/translucency.h"
+#include "sim/scene.h"
+
+namespace opaline::daemon {
+namespace {
+
+using reconstruct::diffusion::FluenceSolver;
+
+constexpr int kContactPixels = 128;
+
+/// The session's files, read.
+Result<ReportData> read_session(const SessionDirectory& session) {
+  auto config = config::load_resolved(session);
+  if (!config) return config.error();
+  auto dataset = read_dataset(session.path());
+  if (!dataset) return dataset.error();
+  auto material = read_material(session.material());
+  if (!material) return material.error();
+  if (!(material->block == dataset->block)) {
+    return invalid_argument("material.vdb and the dataset have different grids");
+  }
+  const auto text = read_text(session.reconstruction());
+  if (!text) return text.error();
+  ReportData data;
+  data.session_id = session.id();
+  data.generator = fmt::format("opaline-preview {}", version());
+  data.config = *std::move(config);
+  data.dataset = *std::move(dataset);
+  data.material = *std::move(material);
+  data.reconstruction = nlohmann::json::parse(*text, nullptr, false);
+  if (!data.reconstruction.is_object()) {
+    return invalid_argument(fmt::format("{} is not JSON", session.reconstruction().string()));
+  }
+  return data;
+}
+
+render::TranslucencyOptions translucency(const config::SessionConfig& config) {
+  render::TranslucencyOptions options;
+  options.boundary = config.reconstruction.boundary;
+  options.source = {config.reconstruction.source, config.reconstruction.deposit};
+  options.solve.tolerance = config.preview.tolerance;
+  return options;
+}
+
+ContactPicture contact_picture(const std::string& name, const HdrPicture& hdr) {
+  const int larger = std::max(hdr.radiance.width(), hdr.radiance.height());
+  const int factor = std::max(1, larger / kContactPixels);
+  const auto flags = hdr.saturated.samples();
+  const auto saturated = static_cast<double>(std::count(flags.begin(), flags.end(), 1));
+  return {name,
+          reduced(hdr.radiance, factor),
+          reduced_marks(hdr.saturated, factor),
+          saturated / static_cast<double>(flags.size())};
+}
+
+class SessionReport {
+ public:
+  SessionReport(JobContext& job, ReportData data) : job_(job), data_(std::move(data)) {}
+  Result<void> run();
+
+ private:
+  Result<void> light_the_material();
+  Result<void> compare_all(render::Renderer& renderer);
+  Result<void> compare(render::Renderer& renderer, std::size_t index);
+  Result<void> compare_with_transport();
+  Result<void> read_facts();
+  Result<void> write_pictures(const RelitLight& light);
+  Result<void> write_image(const std::string& name, ImageFile image, ImageFormat format);
+  Result<void> write_report();
+  void progress(const char* step, double fraction) {
+    job_.events.progress({step, fraction, {}, {}});
+  }
+
+  JobContext& job_;
+  ReportData data_;
+  std::unique_ptr<FluenceSolver> solver_;
+  std::vector<render::SurfaceField> fields_;
+};
+
+Result<void> SessionReport::run() {
+  solver_ = reconstruct::host::make_host_solver({.threads = data_.config.reconstruction.threads});
+  data_.solver = solver_->description();
+  auto renderer = render::Renderer::create(
+      {.gpu = {}, .samples_per_axis = data_.config.preview.samples_per_axis});
+  if (!renderer) return renderer.error();
+  data_.renderer = (*renderer)->description();
+  if (auto done = light_the_material(); !done) return done;
+  if (auto done = compare_all(**renderer); !done) return done;
+  if (auto done = compare_with_transport(); !done) return done;
+  return write_report();
+}
+
+Result<void> SessionReport::light_the_material() {
+  progress("relighting", 0.0);
+  std::vector<render::Light> lights;
+  for (const Illumination& light : data_.dataset.illuminations) {
+    lights.push_back({data_.dataset.lit_face, light.irradiance});
+  }
+  auto fields =
+      render::illuminate(data_.material, lights, translucency(data_.config), *solver_, job_.stop);
+  if (!fields) return fields.error().in("lighting the material");
+  fields_ = *std::move(fields);
+  return ok();
+}
+
+Result<void> SessionReport::compare_all(render::Renderer& renderer) {
+  const auto count = static_cast<double>(data_.dataset.illuminations.size());
+  for (std::size_t m = 0; m < data_.dataset.illuminations.size(); ++m) {
+    progress("relighting", static_cast<double>(m) / count);
+    if (auto done = compare(renderer, m); !done) return done;
+  }
+  double white = 0.0;
+  for (const RelitLight& light : data_.lights) {
+    white = std::max(white, white_point(light.captured, data_.config.preview.white_quantile));
+  }
+  data_.white = white > 0.0 ? white : 1.0;
+  if (auto made = job_.files.make_directories(job_.session.preview()); !made) return made;
+  for (const RelitLight& light : data_.lights) {
+    if (auto written = write_pictures(light); !written) return written;
+  }
+  return ok();
+}
+
+Result<void> SessionReport::compare(render::Renderer& renderer, std::size_t index) {
+  const Illumination& light = data_.dataset.illuminations[index];
+  const auto hdr = read_hdr_picture(job_.session.hdr() / (light.name + ".exr"));
+  if (!hdr) return hdr.error();
+  data_.contacts.push_back(contact_picture(light.name, *hdr));
+  data_.fits.push_back(fit_on_surface(
+      data_.dataset, light, fields_[index], data_.config.reconstruction.model_error));
+  if (!light.held_out) return ok();
+  auto relit = relight(renderer,
+                       fields_[index],
+                       data_.config.rig.calibration.camera.model,
+                       data_.dataset,
+                       light,
+                       *hdr,
+                       job_.stop);
+  if (!relit) return relit.error();
+  data_.lights.push_back(*std::move(relit));
+  return ok();
+}
+
+Result<void> SessionReport::compare_with_transport() {
+  progress("BSSRDF error", 0.0);
+  const config::SimConfig& sim = data_.config.rig.sim;
+  if (!data_.config.rig.is_simulated() || sim.responses.empty()) {
+    data_.bssrdf_absent = "no stored light transport of this sample";
+    return ok();
+  }
+  const auto responses = read_transport(sim.responses);
+  if (!responses) return responses.error();
+  if (const auto scene = sim::scene_from_json(responses->scene); scene) {
+    if (auto truth = sim::make_material(*scene); truth) data_.truth = *std::move(truth);
+  }
+  if (!(responses->block == data_.material.block)) {
+    data_.bssrdf_absent = "the stored light transport is on another grid than the material";
+    return ok();
+  }
+  auto errors =
+      bssrdf_error(data_.material, *responses, translucency(data_.config), *solver_, job_.stop);
+  if (!errors) return errors.error().in("BSSRDF error");
+  data_.bssrdf = *errors;
+  return ok();
+}
+
+Result<void> SessionReport::write_image(const std::string& name,
+                                        ImageFile image,
+                                        ImageFormat format) {
+  const auto bytes = encode_image(image, format);
+  if (!bytes) return bytes.error().in(name);
+  return write_whole(job_.files, job_.session.preview() / name, *bytes);
+}
+
+Result<void> SessionReport::write_pictures(const RelitLight& light) {
+  const double range = round_up(0.05 * data_.white);
+  struct Output {
+    const char* ending;
+    ImageFile image;
+    ImageFormat format;
+  };
+  std::array outputs{
+      Output{"captured.png", {tone_mapped(light.captured, data_.white), {}, {}}, ImageFormat::kPng},
+      Output{"relit.png", {tone_mapped(light.relit, data_.white), {}, {}}, ImageFormat::kPng},
+      Output{"difference.png",
+             {difference_picture(light.relit, light.captured, light.counts, range), {}, {}},
+             ImageFormat::kPng},
+      Output{"captured.exr", {light.captured, {}, {{"unit", "W/(mm^2 sr)"}}}, ImageFormat::kExr},
+      Output{"relit.exr", {light.relit, {}, {{"unit", "W/(mm^2 sr)"}}}, ImageFormat::kExr}};
+  for (Output& output : outputs) {
+    const std::string name = fmt::format("{}-{}", light.name, output.ending);
+    if (auto written = write_image(name, std::move(output.image), output.format); !written) {
+      return written;
+    }
+  }
+  return ok();
+}
+
+Result<void> SessionReport::read_facts() {
+  const auto log = read_events(job_.session.events());
+  if (!log) return log.error();
+  data_.facts = facts_of(log->events);
+  return ok();
+}
+
+Result<void> SessionReport::write_report() {
+  progress("report", 0.0);
+  const ErrorSums relighting = data_.relighting().all();
+  nlohmann::json figures{{"relighting_error", relighting.relative()},
+                         {"noise_floor", relighting.floor()}};
+  if (data_.bssrdf) figures["bssrdf_error"] = data_.bssrdf->all().squared();
+  if (auto noted = job_.events.fact("preview.completed", figures); !noted) return noted;
+  if (auto read = read_facts(); !read) return read;  // up to this very moment
+  const auto page = report_page(data_, job_.stop);
+  if (!page) return page.error().in("report");
+  if (auto written = write_whole(job_.files, job_.session.results(), results_json(data_));
+      !written) {
+    return written;
+  }
+  return write_whole(job_.files, job_.session.report(), *page);
+}
+
+}  // namespace
+
+Result<void> report_session(JobContext& job) {
+  auto data = read_session(job.session);
+  if (!data) return data.error();
+  return SessionReport(job, *std::move(data)).run();
+}
+
+}  // namespace opaline::daemon

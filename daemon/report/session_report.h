@@ -1,0 +1,19 @@
+#pragma once
+
+#include "base/result.h"
+#include "daemon/jobs/job.h"
+
+namespace opaline::daemon {
+
+/// What opaline-preview does with a session whose material has been found: relights the held-out
+/// lights, writes preview/NAME-{captured,relit,difference}.png and preview/NAME-{captured,relit}.exr,
+/// results.json, and report.html last.
+///
+/// Reads: resolved.toml, dataset.*, material.vdb, reconstruction.json, hdr/*.exr, events.jsonl, and
+/// of a simulated station its stored light transport.
+/// Progress: "relighting", "BSSRDF error", "report". Fact: preview.completed {relighting_error,
+/// noise_floor, bssrdf_error?}.
+/// Errors: those of the files, the solver, the renderer and the plots; kCancelled.
+Result<void> report_session(JobContext& job);
+
+}  // namespace opaline::daemon

@@ -1,0 +1,197 @@
+#include "tests/support/fabricated_session.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <random>
+#include <vector>
+
+#include "base/event_log.h"
+#include "base/io/dataset_io.h"
+#include "base/io/image_io.h"
+#include "base/io/volume_io.h"
+#include "config/session_config.h"
+#include "daemon/report/surface_radiance.h"
+#include "reconstruct/host/host_solver.h"
+#include "render/renderer.h"
+#include "render/translucency.h"
+
+namespace opaline::testing {
+namespace {
+
+/// Unit light on a part of the lit face, in shares of its size.
+Illumination part_of_face(const Block& block, std::string name, double x, double y, double size) {
+  Illumination light{std::move(name), false, Image<float>(block.nx, block.ny, 3), {}, {}, {}};
+  for (int j = 0; j < block.ny; ++j) {
+    for (int i = 0; i < block.nx; ++i) {
+      const double u = (i + 0.5) / block.nx;
+      const double v = (j + 0.5) / block.ny;
+      const bool lit = u >= x && u < x + size && v >= y && v < y + size;
+      for (int c = 0; c < 3; ++c) light.irradiance.at(i, j, c) = lit ? 1e-3F : 0.0F;
+    }
+  }
+  return light;
+}
+
+std::vector<Illumination> lights_on(const Block& block, int regions) {
+  std::vector<Illumination> lights;
+  const double size = 1.0 / regions;
+  for (int row = 0; row < regions; ++row) {
+    for (int column = 0; column < regions; ++column) {
+      lights.push_back(part_of_face(
+          block, fmt::format("region_{}_{}", column, row), column * size, row * size, size));
+    }
+  }
+  for (auto& light : {part_of_face(block, "held_out_shifted", 0.5 * size, 0.5 * size, size),
+                      part_of_face(block, "held_out_large", 0.0, 0.25, 2.0 * size),
+                      part_of_face(block, "held_out_small", 0.5, 0.25, 0.5 * size)}) {
+    lights.push_back(light);
+    lights.back().held_out = true;
+  }
+  return lights;
+}
+
+class Fabricator {
+ public:
+  Fabricator(const std::filesystem::path& directory, const Fabrication& what)
+      : directory_(directory), what_(what) {}
+
+  Result<SessionDirectory> run() {
+    auto session = make_directory();
+    if (!session) return session;
+    if (auto made = make_pictures(*session); !made) return made.error();
+    if (auto written = write_dataset(files_, session->path(), dataset_); !written) {
+      return written.error();
+    }
+    if (auto written = write_material(files_, session->material(), what_.found, "test"); !written) {
+      return written.error();
+    }
+    if (auto written = write_whole(files_, session->reconstruction(), reconstruction()); !written) {
+      return written.error();
+    }
+    if (auto logged = log(*session); !logged) return logged.error();
+    return session;
+  }
+
+ private:
+  Result<SessionDirectory> make_directory() {
+    config::SessionConfig config;
+    config.name = "fabricated";
+    config.sample_name = "marble";
+    config.rig_file = directory_ / "rig.toml";
+    config.rig.sim.responses = what_.responses;
+    config.sample.block = what_.truth.block;
+    config.rig.calibration.camera.model = what_.camera;
+    return SessionDirectory::create(
+        files_, directory_, {config.name, "", "", config::to_toml(config)});
+  }
+
+  Result<void> make_pictures(const SessionDirectory& session) {
+    const Block& block = what_.truth.block;
+    dataset_.block = block;
+    dataset_.ior = what_.truth.ior;
+    dataset_.view_cosine = daemon::view_cosines(block, Face::kZMax, what_.camera.centre());
+    dataset_.illuminations = lights_on(block, what_.regions);
+    std::vector<render::Light> lights;
+    for (const auto& light : dataset_.illuminations)
+      lights.push_back({Face::kZMin, light.irradiance});
+    const auto solver = reconstruct::host::make_host_solver({});
+    const auto fields = render::illuminate(what_.truth, lights, {}, *solver, {});
+    if (!fields) return fields.error();
+    const auto renderer = render::Renderer::create({});
+    if (!renderer) return renderer.error();
+    if (auto made = files_.make_directories(session.hdr()); !made) return made;
+    for (std::size_t m = 0; m < lights.size(); ++m) {
+      measure_surface((*fields)[m], dataset_.illuminations[m]);
+      const auto picture = (*renderer)->draw((*fields)[m], what_.camera, {});
+      if (!picture) return picture.error();
+      if (auto taken = write_hdr(session, dataset_.illuminations[m].name, *picture); !taken) {
+        return taken;
+      }
+    }
+    return ok();
+  }
+
+  void measure_surface(const render::SurfaceField& field, Illumination& light) {
+    light.radiance = daemon::surface_radiance(field, Face::kZMax, dataset_.view_cosine);
+    light.radiance_variance = Image<float>(light.radiance.width(), light.radiance.height(), 3);
+    light.mask = Image<std::uint8_t>(light.radiance.width(), light.radiance.height(), 1, 1);
+    for (std::size_t i = 0; i < light.radiance.samples().size(); ++i) {
+      disturb(light.radiance.samples()[i], light.radiance_variance.samples()[i]);
+    }
+  }
+
+  void disturb(float& value, float& variance) {
+    const double deviation = what_.noise * value + 1e-12;
+    value = static_cast<float>(value + deviation * normal_(random_));
+    variance = static_cast<float>(deviation * deviation);
+  }
+
+  Result<void> write_hdr(const SessionDirectory& session,
+                         const std::string& name,
+                         const Image<float>& drawn) {
+    Image<float> pixels(drawn.width(), drawn.height(), 8);
+    for (int y = 0; y < drawn.height(); ++y) {
+      for (int x = 0; x < drawn.width(); ++x) {
+        for (int c = 0; c < 3; ++c) {
+          pixels.at(x, y, c) = drawn.at(x, y, c);
+          disturb(pixels.at(x, y, c), pixels.at(x, y, 3 + c));
+        }
+        pixels.at(x, y, 6) = 1.0F;
+      }
+    }
+    const auto bytes = encode_image(
+        {std::move(pixels), {"R", "G", "B", "var.R", "var.G", "var.B", "mask", "saturated"}, {}},
+        ImageFormat::kExr);
+    if (!bytes) return bytes.error();
+    return write_whole(files_, session.hdr() / (name + ".exr"), *bytes);
+  }
+
+  static std::string reconstruction() {
+    nlohmann::json channels = nlohmann::json::array();
+    for (const char* name : kChannelNames) {
+      nlohmann::json history = nlohmann::json::array();
+      for (int i = 0; i <= 40; ++i) {
+        history.push_back({{"iteration", i}, {"chi_squared_per_datum", 1.0 + 80.0 / (1 + i * i)}});
+      }
+      channels.push_back(
+          {{"channel", name},
+           {"history", history},
+           {"chi_squared_per_datum", 1.05},
+           {"data", 1000},
+           {"solves", 5000},
+           {"seconds", 12.3},
+           {"stop_reason", "discrepancy"},
+           {"stop_explanation", "the pictures are explained to within their noise"}});
+    }
+    return nlohmann::json{{"format", 1}, {"channels", channels}}.dump();
+  }
+
+  Result<void> log(const SessionDirectory& session) {
+    const auto log = EventLog::open(files_, session.events());
+    if (!log) return log.error();
+    for (const char* job : {"capture", "reconstruct"}) {
+      const auto started = (*log)->append("job.started", {{"job", job}});
+      const auto finished =
+          (*log)->append("job.finished", {{"job", job}, {"outcome", "succeeded"}});
+      if (!started || !finished) return internal_error("event log");
+    }
+    return ok();
+  }
+
+  std::filesystem::path directory_;
+  const Fabrication& what_;
+  FileOperations& files_ = system_files();
+  Dataset dataset_;
+  std::mt19937 random_{1};
+  std::normal_distribution<double> normal_;
+};
+
+}  // namespace
+
+Result<SessionDirectory> fabricate_session(const std::filesystem::path& directory,
+                                           const Fabrication& what) {
+  return Fabricator(directory, what).run();
+}
+
+}  // namespace opaline::testing
