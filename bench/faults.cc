@@ -1,0 +1,165 @@
+// Kills the jobs of tiny sessions with SIGKILL at seeded moments, starts them again, and counts how many sessions
+// complete and come out bit-equal to an undisturbed one. Prints one JSON object a figure:
+// {"name": ..., "case": ..., "value": ..., "unit": ...}.
+//
+//   faults [--captures N] [--reconstructions N] [--seed N]
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bench/faults/fault_bed.h"
+
+namespace opaline::bench {
+namespace {
+
+using faults::FaultBed;
+using std::chrono::nanoseconds;
+
+struct Arguments {
+  int captures = 50;
+  int reconstructions = 20;
+  int seed = 1;
+};
+
+std::optional<Arguments> parse(int argc, char** argv) {
+  Arguments arguments;
+  for (int i = 1; i < argc; i += 2) {
+    const std::string_view name = argv[i];
+    int* value = name == "--captures"          ? &arguments.captures
+                 : name == "--reconstructions" ? &arguments.reconstructions
+                 : name == "--seed"            ? &arguments.seed
+                                               : nullptr;
+    if (value == nullptr || i + 1 == argc) return std::nullopt;
+    const std::string_view text = argv[i + 1];
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), *value);
+    if (parsed.ptr != text.data() + text.size() || *value < 0) return std::nullopt;
+  }
+  return arguments;
+}
+
+void print_figure(std::string_view name, int value, std::string_view unit) {
+  fmt::print(R"({{"name": "{}", "case": "tiny", "value": {}, "unit": "{}"}})"
+             "\n",
+             name,
+             value,
+             unit);
+}
+
+struct Tally {
+  int kills = 0;      // that met the job alive
+  int completed = 0;  // sessions that came to their end
+  int bit_equal = 0;  // with the undisturbed one's files
+};
+
+/// How long a job takes undisturbed.
+Result<nanoseconds> timed(const FaultBed& bed,
+                          const std::string& program,
+                          const std::filesystem::path& session) {
+  const auto start = std::chrono::steady_clock::now();
+  if (auto done = bed.complete(program, session); !done) return done.error();
+  return std::chrono::steady_clock::now() - start;
+}
+
+Result<Tally> kill_captures(FaultBed& bed, const Arguments& arguments) {
+  const auto reference = bed.new_session();
+  if (!reference) return reference.error();
+  if (auto warm = bed.complete("opaline-capture", *reference); !warm) return warm.error();
+  const auto expected = faults::capture_results(*reference);
+  if (!expected) return expected.error();
+  const auto undisturbed = bed.new_session();  // the rig is up now
+  if (!undisturbed) return undisturbed.error();
+  const auto length = timed(bed, "opaline-capture", *undisturbed);
+  if (!length) return length.error();
+  Tally tally;
+  for (const nanoseconds at : faults::moments(*length, arguments.captures, arguments.seed)) {
+    const auto session = bed.new_session();
+    if (!session) return session.error();
+    const auto killed = bed.kill_and_complete("opaline-capture", *session, at);
+    if (!killed) {
+      fmt::print(stderr, "{}\n", killed.error().message);
+      continue;
+    }
+    tally.kills += *killed ? 1 : 0;
+    ++tally.completed;
+    const auto files = faults::capture_results(*session);
+    tally.bit_equal += files && *files == *expected ? 1 : 0;
+    std::filesystem::remove_all(*session);
+  }
+  return tally;
+}
+
+Result<Tally> kill_reconstructions(FaultBed& bed, const Arguments& arguments) {
+  const auto reference = bed.new_session();
+  if (!reference) return reference.error();
+  if (auto captured = bed.complete("opaline-capture", *reference); !captured) {
+    return captured.error();
+  }
+  const std::filesystem::path captured = bed.root() / "captured";
+  std::filesystem::copy(*reference, captured, std::filesystem::copy_options::recursive);
+  const auto length = timed(bed, "opaline-reconstruct", *reference);
+  if (!length) return length.error();
+  const auto expected = faults::contents_of(*reference, {"material.vdb"});
+  Tally tally;
+  for (const nanoseconds at : faults::moments(*length, arguments.reconstructions, arguments.seed)) {
+    const std::filesystem::path session = bed.root() / "reconstructed";
+    std::filesystem::copy(captured, session, std::filesystem::copy_options::recursive);
+    const auto killed = bed.kill_and_complete("opaline-reconstruct", session, at);
+    if (killed) {
+      tally.kills += *killed ? 1 : 0;
+      ++tally.completed;
+      const auto files = faults::contents_of(session, {"material.vdb"});
+      tally.bit_equal += files && expected && *files == *expected ? 1 : 0;
+    } else {
+      fmt::print(stderr, "{}\n", killed.error().message);
+    }
+    std::filesystem::remove_all(session);
+  }
+  return tally;
+}
+
+int fail(const Error& error) {
+  fmt::print(stderr, "faults: {}\n", error.message);
+  return 1;
+}
+
+int run(const Arguments& arguments) {
+  const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  const auto bed = FaultBed::create({programs});
+  if (!bed) return fail(bed.error());
+  if (arguments.captures > 0) {
+    const auto tally = kill_captures(**bed, arguments);
+    if (!tally) return fail(tally.error());
+    print_figure("faults.capture_sessions", arguments.captures, "sessions");
+    print_figure("faults.capture_kills", tally->kills, "kills");
+    print_figure("faults.capture_completed", tally->completed, "sessions");
+    print_figure("faults.capture_bit_equal", tally->bit_equal, "sessions");
+  }
+  if (arguments.reconstructions > 0) {
+    const auto tally = kill_reconstructions(**bed, arguments);
+    if (!tally) return fail(tally.error());
+    print_figure("faults.reconstruct_sessions", arguments.reconstructions, "sessions");
+    print_figure("faults.reconstruct_kills", tally->kills, "kills");
+    print_figure("faults.reconstruct_completed", tally->completed, "sessions");
+    print_figure("faults.reconstruct_bit_equal", tally->bit_equal, "sessions");
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace opaline::bench
+
+int main(int argc, char** argv) {
+  const auto arguments = opaline::bench::parse(argc, argv);
+  if (!arguments) {
+    fmt::print(stderr, "usage: faults [--captures N] [--reconstructions N] [--seed N]\n");
+    return 2;
+  }
+  return opaline::bench::run(*arguments);
+}

@@ -1,0 +1,80 @@
+#include "daemon/driver_table.h"
+
+#include <fmt/format.h>
+
+#include <system_error>
+#include <utility>
+
+#include "daemon/simulated_rig.h"
+#include "sim/rig.h"
+#include "sim/rig_client.h"
+#include "sim/sim_camera.h"
+#include "sim/sim_projector.h"
+
+namespace opaline::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::unique_ptr<sim::RigPort>> connect_rig(const config::RigConfig& rig,
+                                                  const fs::path& session,
+                                                  EventSink& events,
+                                                  const std::stop_token& stop) {
+  if (rig.sim.run == config::RigPlace::kInside) {
+    auto built = build_rig(rig.sim, events, stop);
+    if (!built) return built.error();
+    return std::unique_ptr<sim::RigPort>(*std::move(built));
+  }
+  const auto program = program_beside("opaline-rig");
+  if (!program) return program.error();
+  RigProcess process;
+  process.program = *program;
+  process.arguments = {"serve", "--session", fs::absolute(session).string()};
+  process.socket = config::rig_socket(rig);
+  process.identity = rig_identity(rig.sim);
+  if (auto running = ensure_rig_process(process, stop); !running) return running.error();
+  return std::unique_ptr<sim::RigPort>(std::make_unique<sim::RigClient>(process.socket));
+}
+
+}  // namespace
+
+Result<fs::path> program_beside(const char* name) {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  const fs::path program = self.parent_path() / name;
+  if (!error && fs::exists(program, error)) return program;
+  return not_found(fmt::format("{} is not installed beside this program", name));
+}
+
+Result<std::unique_ptr<StationDevices>> StationDevices::create(const config::RigConfig& rig,
+                                                               const fs::path& session,
+                                                               EventSink& events,
+                                                               std::stop_token stop) {
+  std::unique_ptr<StationDevices> devices(new StationDevices());
+  devices->clock_ =
+      std::make_unique<SystemClock>(rig.is_simulated() ? rig.sim.rig.time_factor : 1.0);
+  if (rig.is_simulated()) {
+    auto connected = connect_rig(rig, session, events, stop);
+    if (!connected) return connected.error();
+    devices->rig_ = *std::move(connected);
+  }
+  switch (rig.camera) {
+    case config::Driver::kSim:
+      devices->camera_ = std::make_unique<sim::SimCamera>(*devices->rig_);
+      break;
+    case config::Driver::kReplay:
+      devices->camera_ = std::make_unique<drivers::ReplayCamera>(rig.replay_folder);
+      break;
+  }
+  switch (rig.projector) {
+    case config::Driver::kSim:
+      devices->projector_ = std::make_unique<sim::SimProjector>(*devices->rig_);
+      break;
+    case config::Driver::kReplay:
+      devices->projector_ = std::make_unique<drivers::ReplayProjector>(rig.replay_folder);
+      break;
+  }
+  return devices;
+}
+
+}  // namespace opaline::daemon

@@ -1,0 +1,45 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdlib>
+
+#include "bench/faults/fault_bed.h"
+
+namespace opaline::faults {
+namespace {
+
+constexpr int kKills = 8;
+
+std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+
+TEST(KilledCapture, CompletesWithTheSameBytesAsAnUndisturbedOne) {
+  const auto bed = FaultBed::create({programs()});
+  ASSERT_TRUE(bed) << bed.error().message;
+  const auto reference = (*bed)->new_session();
+  ASSERT_TRUE(reference) << reference.error().message;
+  const auto first = (*bed)->complete("opaline-capture", *reference);  // starts the rig as well
+  ASSERT_TRUE(first) << first.error().message;
+  const auto expected = capture_results(*reference);
+  ASSERT_TRUE(expected) << expected.error().message;
+  EXPECT_EQ(expected->size(), 6u + 3u);
+
+  const auto timed = (*bed)->new_session();
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_TRUE((*bed)->complete("opaline-capture", *timed));
+  const auto length = std::chrono::steady_clock::now() - start;
+  int alive = 0;
+  for (const auto at : moments(length, kKills, 7)) {
+    const auto session = (*bed)->new_session();
+    ASSERT_TRUE(session);
+    const auto killed = (*bed)->kill_and_complete("opaline-capture", *session, at);
+    ASSERT_TRUE(killed) << killed.error().message;
+    alive += *killed ? 1 : 0;
+    const auto files = capture_results(*session);
+    ASSERT_TRUE(files) << files.error().message;
+    EXPECT_EQ(*files, *expected) << "killed after " << at.count() / 1'000'000 << " ms";
+  }
+  EXPECT_GE(alive, kKills / 2);  // the machine may be slower or quicker from run to run
+}
+
+}  // namespace
+}  // namespace opaline::faults
