@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr double kExposureTolerance = 0.05;
+constexpr double kExposureTolerance = 0.15;  // nominal 1/8 s for four thirtieths, as cameras round
 
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
@@ -53,8 +53,7 @@ std::optional<FrameProblem> FrameCheck::check(const Frame& frame,
   if (found && before_) {
     before_->trigger_count.reset();
   } else if (!found) {
-    before_ = Before{
-        frame.trigger_count, frame.start + frame.exposure, pattern_id, exposure, frame.sha256};
+    before_ = Before{frame.trigger_count, frame.start, pattern_id, exposure, frame.sha256};
   }
   return found;
 }
@@ -108,10 +107,10 @@ std::optional<FrameProblem> FrameCheck::against_before(const Frame& frame,
         FrameFault::kMissing,
         fmt::format("trigger count {} after {}", frame.trigger_count, *before_->trigger_count));
   }
-  if (frame.start < before_->end) {
+  if (frame.start <= before_->start) {
     return problem(FrameFault::kOutOfOrder,
-                   fmt::format("began {:.4f} s before the frame before it ended",
-                               seconds(before_->end - frame.start)));
+                   fmt::format("began {:.4f} s before the frame before it",
+                               seconds(before_->start - frame.start)));
   }
   return std::nullopt;
 }

@@ -18,7 +18,7 @@ enum class FrameFault : std::uint8_t {
   kTorn,           ///< the pixels are not those the camera hashed
   kWrongPattern,   ///< shows another pattern than the one asked for, or more than one: stale
   kMissing,        ///< the camera exposed oftener, or less often, than it was asked to
-  kOutOfOrder,     ///< began before the frame before it had ended
+  kOutOfOrder,     ///< did not begin after the frame before it
   kWrongExposure,  ///< exposed otherwise than asked
   kDuplicate,      ///< the same pixels as the frame before, though something else was asked for
   kBlack,          ///< no light where other exposures prove that there is some
@@ -31,7 +31,7 @@ struct FrameProblem {
 };
 
 /// Checks each frame of one open camera against what was asked for and against the frame before:
-/// hash of the pixels, pattern id, trigger count one up, time in order, exposure within 5 %,
+/// hash of the pixels, pattern id, trigger count one up, time in order, exposure within 15 %,
 /// content new.
 class FrameCheck {
  public:
@@ -48,7 +48,7 @@ class FrameCheck {
  private:
   struct Before {
     std::optional<std::uint64_t> trigger_count;  ///< none when not known
-    std::chrono::nanoseconds end;
+    std::chrono::nanoseconds start;
     std::uint64_t pattern_id;
     std::chrono::nanoseconds exposure_asked;
     std::string sha256;

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "daemon/simulated_rig.h"
+#include "drivers/replay/replay_camera.h"
+#include "drivers/replay/replay_projector.h"
 #include "sim/rig.h"
 #include "sim/rig_client.h"
 #include "sim/sim_camera.h"
@@ -63,7 +65,8 @@ Result<std::unique_ptr<StationDevices>> StationDevices::create(const config::Rig
       devices->camera_ = std::make_unique<sim::SimCamera>(*devices->rig_);
       break;
     case config::Driver::kReplay:
-      devices->camera_ = std::make_unique<drivers::ReplayCamera>(rig.replay_folder);
+      devices->camera_ =
+          std::make_unique<drivers::ReplayCamera>(rig.replay_folder, *devices->clock_);
       break;
   }
   switch (rig.projector) {
