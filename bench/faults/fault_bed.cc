@@ -5,7 +5,7 @@
 #include <poll.h>
 #include <spawn.h>
 #include <stdlib.h>
-#include <sys/pidfd.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -84,6 +84,9 @@ std::string rig_text(const fs::path& root, int time_factor) {
                      fmt::arg("cache", (root / "cache").string()));
 }
 
+// A pidfd. glibc 2.36 declares pidfd_open() for C only.
+int open_process(pid_t pid) { return static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)); }
+
 Result<void> append_files(const fs::path& session, const fs::path& path, FileList& files) {
   auto bytes = read_bytes(path, std::size_t{1} << 30);
   if (!bytes) return bytes.error();
@@ -128,7 +131,7 @@ JobProcess::~JobProcess() {
 
 Result<int> JobProcess::wait(std::chrono::nanoseconds patience) {
   if (status_) return *status_;
-  const FileDescriptor process(::pidfd_open(pid_, 0));
+  const FileDescriptor process(open_process(pid_));
   pollfd poll{process.get(), POLLIN, 0};
   timespec limit{};
   limit.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(patience).count();

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <spawn.h>
-#include <sys/pidfd.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -35,6 +35,9 @@ Error system_error(std::string_view doing) {
   return unavailable(
       fmt::format("guardian: {}: {}", doing, std::generic_category().message(errno)));
 }
+
+// A pidfd. glibc 2.36 declares pidfd_open() for C only.
+int open_process(pid_t pid) { return static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)); }
 
 struct Pipe {
   FileDescriptor read;
@@ -126,7 +129,7 @@ Result<std::unique_ptr<Guardian>> Guardian::start(const std::filesystem::path& p
   const auto pid =
       Spawn(hold->read.get(), ready->write.get()).run(program.string(), session.string());
   if (!pid) return pid.error();
-  FileDescriptor process(::pidfd_open(*pid, 0));
+  FileDescriptor process(open_process(*pid));
   if (!process) return system_error("pidfd_open");
   std::unique_ptr<Guardian> guardian(
       new Guardian(*pid, std::move(process), std::move(hold->write)));
