@@ -1,11 +1,17 @@
 #include "base/event_log.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 
+#include <cerrno>
 #include <optional>
+#include <system_error>
 
 #include "base/clock.h"
+#include "base/file_descriptor.h"
 
 namespace opaline {
 namespace {
@@ -50,14 +56,41 @@ std::optional<Event> parse_line(std::string_view line) {
                json["data"]};
 }
 
+Error unreadable(const std::filesystem::path& path) {
+  return unavailable(
+      fmt::format("cannot read {}: {}", path.string(), std::generic_category().message(errno)));
+}
+
+// The rest of the file; a follower asks for it several times a second.
+Result<std::string> read_from(const std::filesystem::path& path, std::uint64_t offset) {
+  const FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!fd && errno == ENOENT) return not_found(path.string());
+  struct stat status {};
+  if (!fd || ::fstat(fd.get(), &status) != 0) return unreadable(path);
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  if (offset > size) {
+    return invalid_argument(fmt::format("{} is shorter than offset {}", path.string(), offset));
+  }
+  if (size - offset > kLogLimit) return invalid_argument(path.string() + " is too long for a log");
+  std::string text(size - offset, '\0');
+  for (std::size_t got = 0; got < text.size();) {
+    const ssize_t n =
+        ::pread(fd.get(), text.data() + got, text.size() - got, static_cast<off_t>(offset + got));
+    if (n < 0 && errno != EINTR) return unreadable(path);
+    if (n == 0) text.resize(got);  // cut off meanwhile
+    if (n > 0) got += static_cast<std::size_t>(n);
+  }
+  return text;
+}
+
 struct Line {
   std::string_view text;
-  std::uint64_t end = 0;  // offset just after its newline
+  std::uint64_t end = 0;  // just after its newline
 };
 
-std::vector<Line> finished_lines(std::string_view text, std::uint64_t offset) {
+std::vector<Line> finished_lines(std::string_view text) {
   std::vector<Line> lines;
-  std::size_t begin = offset;
+  std::size_t begin = 0;
   for (std::size_t end = text.find('\n', begin); end != std::string_view::npos;
        end = text.find('\n', begin)) {
     lines.push_back({text.substr(begin, end - begin), end + 1});
@@ -69,16 +102,13 @@ std::vector<Line> finished_lines(std::string_view text, std::uint64_t offset) {
 }  // namespace
 
 Result<EventBatch> read_events(const std::filesystem::path& path, std::uint64_t offset) {
-  const Result<std::string> text = read_text(path, kLogLimit);
+  const Result<std::string> text = read_from(path, offset);
   if (!text && text.error().code == ErrorCode::kNotFound) return EventBatch{};
   if (!text) return text.error();
   EventBatch batch{{}, offset};
-  if (offset > text->size()) {
-    return invalid_argument(fmt::format("{} is shorter than offset {}", path.string(), offset));
-  }
   std::size_t damaged = 0;
   std::size_t number = 0;
-  for (const Line& line : finished_lines(*text, offset)) {
+  for (const Line& line : finished_lines(*text)) {
     ++number;
     std::optional<Event> event = parse_line(line.text);
     if (!event) {
@@ -92,7 +122,7 @@ Result<EventBatch> read_events(const std::filesystem::path& path, std::uint64_t 
                       offset));
     } else {
       batch.events.push_back(*std::move(event));
-      batch.next_offset = line.end;
+      batch.next_offset = offset + line.end;
     }
   }
   return batch;

@@ -22,6 +22,7 @@ class EventFollower {
   std::filesystem::path log_;
   std::uint64_t offset_ = 0;
   std::uint64_t seen_size_ = 0;
+  std::filesystem::file_time_type seen_time_;
 };
 
 }  // namespace opaline::daemon

@@ -40,7 +40,7 @@ struct Stage {
 ///   session.cancelled  no stage is to be started any more
 ///   session.resumed    what failed or was cancelled may be tried again
 /// Any other fact counts as work done; progress does not.
-class SessionHistory {
+class SessionHistory {  // NOLINT(bugprone-exception-escape): a null JSON value throws nothing
  public:
   void apply(const Event& event);
 
