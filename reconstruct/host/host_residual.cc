@@ -35,7 +35,7 @@ void HostPasses::add_correction(Slab slab) {
 void HostPasses::add_to_line(
     const float* d, double d_factor, const float* p, double p_factor, double* x) const {
   const int nx = grid_.levels[0].nx;
-  for (int i = 0; i < nx; ++i)
+  for (std::ptrdiff_t i = 0; i < nx; ++i)
     x[i] += d_factor * static_cast<double>(d[i * width_]) +
             p_factor * static_cast<double>(p[i * width_]);
 }

@@ -20,7 +20,7 @@ template <int W>
 struct Lanes {
   using D = hn::CappedTag<float, W>;
   using V = hn::Vec<D>;
-  static constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
+  static constexpr std::ptrdiff_t kLanes = static_cast<std::ptrdiff_t>(hn::MaxLanes(D()));
   static constexpr int kCount = W / kLanes;
 
   V v[kCount];
@@ -76,8 +76,8 @@ struct Lanes {
 
 /// a += sum g u over the six neighbours of cell i.
 template <int W>
-HWY_INLINE void add_neighbours(Lanes<W>& a, const Stencil& s, int i) {
-  const std::ptrdiff_t at = std::ptrdiff_t{i} * W;
+HWY_INLINE void add_neighbours(Lanes<W>& a, const Stencil& s, std::ptrdiff_t i) {
+  const std::ptrdiff_t at = i * W;
   a.add(s.gx[i - 1], s.u + at - W);
   a.add(s.gx[i], s.u + at + W);
   a.add(s.gi_before[i], s.inner_before + at);
@@ -89,8 +89,8 @@ HWY_INLINE void add_neighbours(Lanes<W>& a, const Stencil& s, int i) {
 /// a += sum g (u_i - u) over the six neighbours of cell i. Subtracting first keeps single precision exact where u is
 /// smooth; D u - sum g u would lose as many digits as K is ill-conditioned.
 template <int W>
-HWY_INLINE void add_flows(Lanes<W>& a, const Lanes<W>& u, const Stencil& s, int i) {
-  const std::ptrdiff_t at = std::ptrdiff_t{i} * W;
+HWY_INLINE void add_flows(Lanes<W>& a, const Lanes<W>& u, const Stencil& s, std::ptrdiff_t i) {
+  const std::ptrdiff_t at = i * W;
   a.add_difference(s.gx[i - 1], u, s.u + at - W);
   a.add_difference(s.gx[i], u, s.u + at + W);
   a.add_difference(s.gi_before[i], u, s.inner_before + at);
@@ -104,7 +104,7 @@ struct Kernels {
   using L = Lanes<W>;
 
   static void scale(float* z, const float* r, const float* inverse, int first, int nx) {
-    for (int i = first; i < nx; i += 2) {
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
       hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
@@ -121,9 +121,9 @@ struct Kernels {
                       const float* outer,
                       int first,
                       int nx) {
-    for (int i = first; i < nx; i += 2) {
-      const int up = i / w.ratio_x;
-      const int beside = i % 2 == 1 ? up + 1 : up - 1;
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      const std::ptrdiff_t up = i / w.ratio_x;
+      const std::ptrdiff_t beside = i % 2 == 1 ? up + 1 : up - 1;
       hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
@@ -137,7 +137,7 @@ struct Kernels {
 
   static void sweep(
       float* z, const float* r, const float* inverse, const Stencil& s, int first, int nx) {
-    for (int i = first; i < nx; i += 2) {
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
       hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       add_neighbours<W>(a, s, i);
@@ -153,9 +153,10 @@ struct Kernels {
                            float* outer,
                            int first,
                            int nx) {
-    for (int i = first; i < nx; i += 2) {
-      const int down = i / w.ratio_x;
-      const int beside = i % 2 == 1 ? HWY_MIN(down + 1, w.coarse_nx - 1) : HWY_MAX(down - 1, 0);
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      const std::ptrdiff_t down = i / w.ratio_x;
+      const std::ptrdiff_t beside = i % 2 == 1 ? HWY_MIN(down + 1, std::ptrdiff_t{w.coarse_nx} - 1)
+                                               : HWY_MAX(down - 1, std::ptrdiff_t{0});
       L a = L::zero();
       add_neighbours<W>(a, s, i);
       a.add_scaled_to(below + down * W, w.own[i]);
@@ -167,7 +168,7 @@ struct Kernels {
 
   static void combine(float* out, const float* z, const float* p, const float* beta, int nx) {
     const L b = L::load(beta);
-    for (int i = 0; i < nx; ++i) {
+    for (std::ptrdiff_t i = 0; i < nx; ++i) {
       L a = L::load(z + i * W);
       a.add(b, L::load(p + i * W));
       a.store(out + i * W);
@@ -183,9 +184,9 @@ struct Kernels {
                         int nx) {
     const L step = L::load(alpha);
     if (mode == Direction::kRestart)
-      for (int i = 0; i < nx; ++i) L::load(z + i * W).store(p + i * W);
+      for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(p + i * W);
     if (mode == Direction::kStore || mode == Direction::kAdd)
-      for (int i = 0; i < nx; ++i) {
+      for (std::ptrdiff_t i = 0; i < nx; ++i) {
         L sum = mode == Direction::kAdd ? L::load(d + i * W) : L::zero();
         sum.add(step, L::load(p + i * W));
         sum.store(d + i * W);
@@ -195,7 +196,7 @@ struct Kernels {
 
   static void apply(float* q, const float* sink, const Stencil& s, double* sum, int nx) {
     L total = L::zero();
-    for (int i = 0; i < nx; ++i) {
+    for (std::ptrdiff_t i = 0; i < nx; ++i) {
       const L u = L::load(s.u + i * W);
       L a = u;
       a.scale(sink[i]);
@@ -209,7 +210,7 @@ struct Kernels {
   static void update(float* r, const float* q, const float* alpha, double* sum, int nx) {
     const L step = L::load(alpha);
     L total = L::zero();
-    for (int i = 0; i < nx; ++i) {
+    for (std::ptrdiff_t i = 0; i < nx; ++i) {
       L a = L::load(r + i * W);
       a.subtract(step, L::load(q + i * W));
       a.store(r + i * W);
@@ -220,7 +221,7 @@ struct Kernels {
 
   static void dot(const float* a, const float* b, double* sum, int nx) {
     L total = L::zero();
-    for (int i = 0; i < nx; ++i) total.add(L::load(a + i * W), L::load(b + i * W));
+    for (std::ptrdiff_t i = 0; i < nx; ++i) total.add(L::load(a + i * W), L::load(b + i * W));
     total.add_to(sum);
   }
 
