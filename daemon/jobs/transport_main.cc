@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -134,9 +135,7 @@ int exit_code(opaline::ErrorCode code) {
   return code == opaline::ErrorCode::kCancelled ? 3 : 1;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app("Computes the light transport of a simulated sample, patch by patch.");
   Arguments arguments;
   add_options(app, arguments);
@@ -155,4 +154,15 @@ int main(int argc, char** argv) {
   if (done) return 0;
   opaline::log::error("{}", done.error().message);
   return exit_code(done.error().code);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+    return 1;
+  }
 }
