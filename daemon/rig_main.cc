@@ -99,7 +99,7 @@ Result<void> serve(const Arguments& arguments) {
   std::fflush(stdout);
   const auto idle = std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double, std::ratio<60>>(arguments.idle_minutes));
-  const auto served = (*server)->serve(idle, stop.get_token());
+  auto served = (*server)->serve(idle, stop.get_token());
   opaline::log::info("simulated rig {}: ends", config->station);
   return served;
 }

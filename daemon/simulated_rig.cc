@@ -156,7 +156,7 @@ Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop)
   const auto pid = spawn(process);
   if (!pid) return pid.error();
   log::info("simulated rig: process {} at {}", *pid, process.socket.string());
-  const auto running = wait_until_it_answers(process, *pid, stop);
+  auto running = wait_until_it_answers(process, *pid, stop);
   if (!running) ::kill(*pid, SIGTERM);  // nobody would look after it
   return running;
 }

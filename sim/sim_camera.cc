@@ -23,16 +23,16 @@ Result<drivers::CameraInfo> SimCamera::info() const {
 
 Result<Frame> SimCamera::capture(const drivers::ExposureRequest& request, std::stop_token stop) {
   std::uint64_t session = 0;
-  std::stop_source closing;
+  std::stop_token closing;
   {
     const std::lock_guard lock(mutex_);
     session = session_;
-    closing = closing_;
+    closing = closing_.get_token();
   }
   if (session == 0) return unavailable("simulated camera: not open");
   std::stop_source either;
   const std::stop_callback on_stop(stop, [&] { either.request_stop(); });
-  const std::stop_callback on_close(closing.get_token(), [&] { either.request_stop(); });
+  const std::stop_callback on_close(closing, [&] { either.request_stop(); });
   Result<Frame> frame = rig_.expose(session, request.exposure, either.get_token());
   if (!frame && frame.error().code == ErrorCode::kUnavailable) {
     const std::lock_guard lock(mutex_);

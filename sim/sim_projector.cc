@@ -27,7 +27,7 @@ Result<void> SimProjector::show(const drivers::Pattern& pattern, std::stop_token
     session = session_;
   }
   if (session == 0) return unavailable("simulated projector: not open");
-  const Result<void> shown = rig_.show(session, pattern, stop);
+  Result<void> shown = rig_.show(session, pattern, stop);
   if (!shown && shown.error().code == ErrorCode::kUnavailable) {
     const std::lock_guard lock(mutex_);
     if (session_ == session) session_ = 0;

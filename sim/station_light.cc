@@ -96,6 +96,7 @@ std::vector<float> gaussian(double sigma) {
     sum += weights.back();
   }
   std::vector<float> normalised;
+  normalised.reserve(weights.size());
   for (const double weight : weights) normalised.push_back(static_cast<float>(weight / sum));
   return normalised;
 }
@@ -114,7 +115,7 @@ void blur_line(float* samples,
                const std::vector<float>& kernel,
                std::vector<float>& padded) {
   const int radius = static_cast<int>(kernel.size() / 2);
-  padded.resize(static_cast<std::size_t>(count + 2 * radius));
+  padded.resize(kernel.size() - 1 + static_cast<std::size_t>(count));
   for (int i = -radius; i < count + radius; ++i)
     padded[i + radius] = samples[mirrored(i, count) * stride];
   for (int i = 0; i < count; ++i) {
