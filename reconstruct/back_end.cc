@@ -17,10 +17,14 @@ Result<std::unique_ptr<diffusion::FluenceSolver>> make_host(const InverseOptions
 
 Result<std::unique_ptr<diffusion::FluenceSolver>> make_solver(const InverseOptions& options) {
   switch (options.back_end) {
-    case BackEnd::kReference: return diffusion::make_reference_solver();
-    case BackEnd::kVulkan: return vulkan::make_vulkan_solver({});
-    case BackEnd::kHost: return make_host(options);
-    case BackEnd::kAuto: break;
+    case BackEnd::kReference:
+      return diffusion::make_reference_solver();
+    case BackEnd::kVulkan:
+      return vulkan::make_vulkan_solver({});
+    case BackEnd::kHost:
+      return make_host(options);
+    case BackEnd::kAuto:
+      break;
   }
   if (vulkan::real_gpu_available()) {
     if (auto solver = vulkan::make_vulkan_solver({})) return solver;

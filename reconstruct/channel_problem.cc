@@ -54,11 +54,25 @@ Result<std::vector<double>> transmitted(const Dataset& d, const Illumination& i,
   return q;
 }
 
+// Of the usable data of one channel.
+double root_mean_square(const Illumination& i, int channel) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t p = 0; p < i.mask.pixel_count(); ++p) {
+    if (i.mask.samples()[p] == 0) continue;
+    const double l = i.radiance.samples()[p * kColorChannels + channel];
+    sum += l * l;
+    ++count;
+  }
+  return count == 0 ? 0.0 : std::sqrt(sum / static_cast<double>(count));
+}
+
 Result<void> add_data(const Illumination& i,
                       int channel,
                       double model_error,
                       ChannelIllumination& out) {
   const std::size_t pixels = i.mask.pixel_count();
+  const double level = root_mean_square(i, channel);
   out.radiance.assign(pixels, 0.0);
   out.weight.assign(pixels, 0.0);
   for (std::size_t p = 0; p < pixels; ++p) {
@@ -73,7 +87,7 @@ Result<void> add_data(const Illumination& i,
                       l,
                       variance));
     }
-    const double model = model_error * std::max(l, 0.0);
+    const double model = model_error * std::hypot(l, level);
     out.radiance[p] = l;
     out.weight[p] = 1.0 / (variance + model * model);
   }

@@ -15,7 +15,7 @@ namespace opaline::reconstruct {
 struct ChannelIllumination {
   std::vector<double> irradiance;  ///< q = (1 - R(0)) E on the lit face, transmitted, W/mm^2
   std::vector<double> radiance;    ///< L* on the seen face, W/(mm^2 sr)
-  std::vector<double> weight;      ///< w = 1 / (variance + (model_error L*)^2); 0 where masked
+  std::vector<double> weight;      ///< w of InverseOptions::model_error; 0 where masked
 };
 
 /// One colour channel of a dataset, as the objective reads it.

@@ -12,9 +12,9 @@ namespace {
 using Logs = Eigen::Vector2d;  // log sigma_s', log sigma_a
 
 constexpr int kMaxIterations = 20;
-constexpr double kDifference =
-    1e-4;  // of a logarithm: truncation 1e-4, rounding of the solves 1e-2, both of one step
-constexpr double kConverged = 1e-4;  // change of the logarithms
+// Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
+constexpr double kDifference = 1e-2;
+constexpr double kConverged = 1e-3;  // change of the logarithms
 
 class Fit {
  public:
@@ -92,11 +92,12 @@ class Fit {
   Result<double> step(Logs& logs, Eigen::VectorXd& r, double& damping) {
     Eigen::MatrixX2d jacobian(r.size(), 2);
     for (int i = 0; i < 2; ++i) {
-      Logs shifted = logs;
-      shifted[i] += kDifference;
-      const auto there = residuals(shifted);
-      if (!there) return there.error();
-      jacobian.col(i) = (*there - r) / kDifference;
+      const Logs shift = kDifference * Logs::Unit(i);
+      const auto above = residuals(logs + shift);
+      if (!above) return above.error();
+      const auto below = residuals(logs - shift);
+      if (!below) return below.error();
+      jacobian.col(i) = (*above - *below) / (2.0 * kDifference);
     }
     const Eigen::Matrix2d normal = jacobian.transpose() * jacobian;
     const Logs slope = jacobian.transpose() * r;

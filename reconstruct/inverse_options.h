@@ -29,18 +29,18 @@ struct InverseOptions {
   diffusion::SourceModel source = diffusion::SourceModel::kCollimated;
   diffusion::Deposit deposit = diffusion::Deposit::kCentroid;
   diffusion::BoundaryModel boundary = diffusion::BoundaryModel::kTwoMoment;
-  /// Relative error of the diffusion model itself, added to the variance of each datum as
-  /// (model_error L)^2; >= 0.
+  /// Relative error of the diffusion model: (model_error hypot(L, l))^2 is added to the variance of each datum, l the
+  /// root mean square of its picture, since the model's error far from the light does not fall with L; >= 0.
   double model_error = 0.01;
   /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
-  double regularization = 1.0;
+  double regularization = 300.0;
   int max_iterations = 150;  ///< of L-BFGS, per channel; 0 keeps the homogeneous fit
-  double tolerance = 1e-6;   ///< of every diffusion solve, relative residual; > 0
-  /// Discrepancy principle: stop once chi^2 <= discrepancy times the number of data; >= 0, 0 never
-  /// stops so.
-  double discrepancy = 1.0;
-  /// Stop when the objective falls by less than this fraction over ten iterations; >= 0.
-  double stalled = 1e-3;
+  double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
+  /// Discrepancy principle: stop once chi^2 <= discrepancy times the number of data; >= 0, 0 never stops so. 1 is
+  /// Morozov's; the default is lower because model_error counts generously, and the prior keeps the noise out.
+  double discrepancy = 0.5;
+  double stalled =
+      0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0
   CoefficientBounds absorption{1e-5, 10.0};
   CoefficientBounds reduced_scattering{0.02, 100.0};
   int checkpoint_every = 10;  ///< iterations of L-BFGS; >= 1

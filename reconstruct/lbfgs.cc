@@ -139,7 +139,8 @@ Result<StepOutcome> search(const LbfgsState& state,
     for (std::size_t i = 0; i < d.size(); ++i) {
       promised += state.at.gradient[i] * (trial.x[i] - state.x[i]);
     }
-    const bool enough = trial.at.value <= state.at.value + kSufficientDecrease * promised;
+    const bool enough = trial.at.value < state.at.value &&
+                        trial.at.value <= state.at.value + kSufficientDecrease * promised;
     const double new_slope = dot(trial.at.gradient, d);
     if (!enough) {
       if (found) break;  // went further than was good
