@@ -36,8 +36,9 @@ Result<void> open(Context::Handles& handles) {
 }  // namespace
 
 bool ContextOptions::validation_from_environment() {
-  const char* value = std::getenv("OPALINE_VULKAN_VALIDATION");
-  return value != nullptr && std::string_view(value) != "0" && std::string_view(value) != "";
+  const char* set = std::getenv("OPALINE_VULKAN_VALIDATION");
+  const std::string_view value = set != nullptr ? set : "";
+  return !value.empty() && value != "0";
 }
 
 Context::Context() = default;
