@@ -34,7 +34,8 @@ class RayCaster {
   void draw_pixel(Image<float>& picture, int x, int y, int s) const {
     std::array<double, 4> sum{};
     for (int k = 0; k < s * s; ++k) {
-      const Vec3 ray = camera_.ray_direction({x + (k % s + 0.5) / s, y + (k / s + 0.5) / s});
+      const int row = k / s;
+      const Vec3 ray = camera_.ray_direction({x + (k % s + 0.5) / s, y + (row + 0.5) / s});
       const std::optional<Hit> hit = meet(ray);
       if (!hit) continue;
       for (int c = 0; c < 3; ++c) sum[c] += radiance(*hit, c);
