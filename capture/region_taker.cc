@@ -13,6 +13,9 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+constexpr nanoseconds kReplugPatience = std::chrono::seconds(10);
+constexpr nanoseconds kReplugPause = std::chrono::milliseconds(200);
+
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 bool can_retry(ErrorCode code) {
@@ -108,10 +111,14 @@ std::size_t RegionTaker::frame_bytes() const {
 }
 
 Result<void> RegionTaker::recover(std::stop_token stop) {
-  station_.camera.close();
-  station_.projector.close();
-  if (!station_.clock.sleep(projector_.frame_period, stop)) return cancelled("while recovering");
-  return open_devices();
+  const nanoseconds deadline = station_.clock.now() + kReplugPatience;
+  for (;;) {
+    station_.camera.close();
+    station_.projector.close();
+    if (!station_.clock.sleep(kReplugPause, stop)) return cancelled("while devices were away");
+    auto opened = open_devices();
+    if (opened || station_.clock.now() >= deadline) return opened;
+  }
 }
 
 Result<TakenLight> RegionTaker::with_retries(const std::string& name,

@@ -46,7 +46,7 @@ struct TakenLight {
 /// Takes one light after another: shows it, lets it settle, exposes, checks every frame. A light
 /// with a bad frame is taken again from its first exposure, up to the retries allowed; each time is
 /// a fact, "region.retaken" {region, attempt, fault, message}. Devices that were lost are closed
-/// and opened again between the tries.
+/// and opened again between the tries, until they are back or ten seconds are over.
 ///
 /// Threads: one caller at a time. Waits as the devices do. Errors: kUnavailable or kTimeout, naming
 /// light and exposure, when the retries are used up; kCancelled; kInvalidArgument.

@@ -36,9 +36,14 @@ Files results_of(const fs::path& directory) {
 class SequenceTest : public ::testing::Test {
  protected:
   Result<CaptureSummary> run(const fs::path& directory, std::stop_token stop = {}) {
+    return run(directory, support::unsynced_files(), std::move(stop));
+  }
+  Result<CaptureSummary> run(const fs::path& directory,
+                             FileOperations& files,
+                             std::stop_token stop = {}) {
     support::TinyStation tiny(options_);
     events_ = std::make_unique<support::RecordingSink>();
-    const Workplace workplace{directory, support::unsynced_files(), *events_, free_bytes_};
+    const Workplace workplace{directory, files, *events_, free_bytes_};
     auto summary = capture_session(task_, tiny.station(), workplace, stop);
     lamp_on_ = tiny.rig().status()->lamp_on;
     exposures_ = tiny.rig().status()->exposures;
@@ -267,6 +272,20 @@ TEST_F(SequenceTest, SaysBeforehandThatTheDiskIsTooFullAndGoesOnOnceThereIsRoom)
               AllOf(HasSubstr(dir_.path().string()), HasSubstr("bytes"), HasSubstr("100000")));
   EXPECT_EQ(exposures_, 0u);
   free_bytes_ = nullptr;
+  ASSERT_TRUE(run(dir_.path()));
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+TEST_F(SequenceTest, StopsNamingFileAndBytesWhenTheDiskFillsUpAndGoesOnOnceThereIsRoom) {
+  for (const std::size_t room : {30'000u, 150'000u, 400'000u}) {
+    support::FullDisk full(room);
+    const auto summary = run(dir_.path(), full);
+    ASSERT_FALSE(summary) << room;
+    EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+    EXPECT_THAT(summary.error().message,
+                AllOf(HasSubstr(dir_.path().string()), HasSubstr("bytes"), HasSubstr("no space")));
+    EXPECT_FALSE(lamp_on_);
+  }
   ASSERT_TRUE(run(dir_.path()));
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
 }

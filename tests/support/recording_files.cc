@@ -1,5 +1,7 @@
 #include "tests/support/recording_files.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <map>
@@ -216,6 +218,38 @@ Result<void> RecordingFiles::rename(const fs::path& from, const fs::path& to) {
 Result<void> RecordingFiles::remove(const fs::path& path) {
   return note(system_files().remove(path), {Kind::kRemove, path, {}, {}, 0});
 }
+
+Result<void> FullDisk::take(const fs::path& path, std::size_t bytes) {
+  if (bytes > room_) {
+    return unavailable(
+        fmt::format("cannot write {} bytes to {}: no space left on device", bytes, path.string()));
+  }
+  room_ -= bytes;
+  return ok();
+}
+
+Result<void> FullDisk::make_directories(const fs::path& directory) {
+  return unsynced_files().make_directories(directory);
+}
+Result<void> FullDisk::write(const fs::path& path, std::span<const std::byte> bytes) {
+  if (auto room = take(path, bytes.size()); !room) return room;
+  return unsynced_files().write(path, bytes);
+}
+Result<void> FullDisk::append(const fs::path& path, std::span<const std::byte> bytes) {
+  if (auto room = take(path, bytes.size()); !room) return room;
+  return unsynced_files().append(path, bytes);
+}
+Result<void> FullDisk::truncate(const fs::path& path, std::uint64_t size) {
+  return unsynced_files().truncate(path, size);
+}
+Result<void> FullDisk::sync(const fs::path& path) { return unsynced_files().sync(path); }
+Result<void> FullDisk::sync_directory(const fs::path& directory) {
+  return unsynced_files().sync_directory(directory);
+}
+Result<void> FullDisk::rename(const fs::path& from, const fs::path& to) {
+  return unsynced_files().rename(from, to);
+}
+Result<void> FullDisk::remove(const fs::path& path) { return unsynced_files().remove(path); }
 
 FileOperations& unsynced_files() {
   static UnsyncedFiles instance;

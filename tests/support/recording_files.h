@@ -56,6 +56,25 @@ class RecordingFiles : public FileOperations {
 /// The machine's own files without waiting for the disk: for tests in which no power fails.
 FileOperations& unsynced_files();
 
+/// A disk with room for so many bytes more: a write or append past it fails as the system's does, and
+/// leaves nothing behind.
+class FullDisk : public FileOperations {
+ public:
+  explicit FullDisk(std::size_t room) : room_(room) {}
+  Result<void> make_directories(const std::filesystem::path& directory) override;
+  Result<void> write(const std::filesystem::path& path, std::span<const std::byte> bytes) override;
+  Result<void> append(const std::filesystem::path& path, std::span<const std::byte> bytes) override;
+  Result<void> truncate(const std::filesystem::path& path, std::uint64_t size) override;
+  Result<void> sync(const std::filesystem::path& path) override;
+  Result<void> sync_directory(const std::filesystem::path& directory) override;
+  Result<void> rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
+  Result<void> remove(const std::filesystem::path& path) override;
+
+ private:
+  Result<void> take(const std::filesystem::path& path, std::size_t bytes);
+  std::size_t room_;
+};
+
 /// Lays out in `directory` what a disk may hold after the power failed behind the last of
 /// `operations`: what was synced is there; of what was not, content is dropped, torn, zeroed from
 /// somewhere on, or there, and of each directory's changes of names a first part is kept, as the seed
