@@ -58,7 +58,7 @@ const std::map<std::string, std::vector<std::string>> kOnlyUsers{
     {"sqlite3.h", {"daemon"}},
     {"toml++/", {"config", "drivers"}},
     {"spdlog/", {"base"}},
-    {"Eigen/", {"tests", "bench"}},
+    {"Eigen/", {"reconstruct", "tests", "bench"}},
     {"hwy/", {"reconstruct", "sim"}},
     {"CLI/", {"daemon", "bench"}},
 };
