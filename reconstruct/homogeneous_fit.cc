@@ -12,6 +12,7 @@ namespace {
 using Logs = Eigen::Vector2d;  // log sigma_s', log sigma_a
 
 constexpr int kMaxIterations = 20;
+constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
 constexpr double kConverged = 1e-3;  // change of the logarithms
@@ -87,29 +88,38 @@ class Fit {
   }
 
  private:
-  // One Levenberg-Marquardt step; returns how far the logarithms moved, 0 when nothing lower was
-  // found.
-  Result<double> step(Logs& logs, Eigen::VectorXd& r, double& damping) {
-    Eigen::MatrixX2d jacobian(r.size(), 2);
+  Result<Eigen::MatrixX2d> jacobian(const Logs& logs, Eigen::Index size) {
+    Eigen::MatrixX2d columns(size, 2);
     for (int i = 0; i < 2; ++i) {
       const Logs shift = kDifference * Logs::Unit(i);
       const auto above = residuals(logs + shift);
       if (!above) return above.error();
       const auto below = residuals(logs - shift);
       if (!below) return below.error();
-      jacobian.col(i) = (*above - *below) / (2.0 * kDifference);
+      columns.col(i) = (*above - *below) / (2.0 * kDifference);
     }
-    const Eigen::Matrix2d normal = jacobian.transpose() * jacobian;
-    const Logs slope = jacobian.transpose() * r;
-    for (; damping < 1e8; damping *= 10.0) {
+    return columns;
+  }
+
+  // One Levenberg-Marquardt step; returns how far the logarithms moved, 0 when nothing lower was
+  // found.
+  Result<double> step(Logs& logs, Eigen::VectorXd& r, double& damping) {
+    const auto slopes = jacobian(logs, r.size());
+    if (!slopes) return slopes.error();
+    const Eigen::Matrix2d normal = slopes->transpose() * *slopes;
+    const Logs gradient = slopes->transpose() * r;
+    for (int attempt = 0; attempt < kMaxDampings; ++attempt) {
       Eigen::Matrix2d damped = normal;
       damped.diagonal() *= 1.0 + damping;
       damped.diagonal().array() += 1e-12 * normal.trace();
-      const Logs move = (-damped.inverse() * slope).cwiseMax(-1.5).cwiseMin(1.5);
+      const Logs move = (-damped.inverse() * gradient).cwiseMax(-1.5).cwiseMin(1.5);
       const Logs next = bounded(logs + move);
       auto there = residuals(next);
       if (!there) return there.error();
-      if (there->squaredNorm() >= r.squaredNorm()) continue;
+      if (there->squaredNorm() >= r.squaredNorm()) {
+        damping *= 10.0;
+        continue;
+      }
       const double moved = (next - logs).cwiseAbs().maxCoeff();
       logs = next;
       r = *std::move(there);
