@@ -14,9 +14,13 @@ nanoseconds scaled(nanoseconds duration, double factor) {
 
 }  // namespace
 
+SystemClock::SystemClock(double factor)
+    : factor_(factor), start_(std::chrono::steady_clock::now().time_since_epoch()) {}
+
+// Only what has passed is scaled: hours of uptime times a large factor would overflow.
 nanoseconds SystemClock::now() const {
   const nanoseconds real = std::chrono::steady_clock::now().time_since_epoch();
-  return factor_ == 1.0 ? real : scaled(real, factor_);
+  return factor_ == 1.0 ? real : start_ + scaled(real - start_, factor_);
 }
 
 bool SystemClock::sleep(nanoseconds duration, std::stop_token stop) {

@@ -17,15 +17,16 @@ class Clock {
   virtual bool sleep(std::chrono::nanoseconds duration, std::stop_token stop) = 0;
 };
 
-/// CLOCK_MONOTONIC run `factor` times as fast: at 1000, a second of it passes in a millisecond.
+/// CLOCK_MONOTONIC, run `factor` times as fast from this clock's making on: at 1000, a second passes in a millisecond.
 class SystemClock : public Clock {
  public:
-  explicit SystemClock(double factor = 1.0) : factor_(factor) {}
+  explicit SystemClock(double factor = 1.0);
   std::chrono::nanoseconds now() const override;
   bool sleep(std::chrono::nanoseconds duration, std::stop_token stop) override;
 
  private:
   double factor_;
+  std::chrono::nanoseconds start_;  // real
 };
 
 /// Stands still until told, or until somebody sleeps: sleeping advances it at once.

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "base/lock.h"
 #include "tests/api/opalined_fixture.h"
 
 namespace opaline::testing {
@@ -119,6 +120,8 @@ TEST_F(Opalined, LetsNoSecondJobOnASession) {
   start();
   const std::string id = create();
   ASSERT_TRUE(becomes(id, "running"));
+  ASSERT_TRUE(
+      eventually([&] { return FileLock::is_held(sessions_ / id / "lock").value_or(false); }));
 
   Process second({fakes() + "/opaline-capture", (sessions_ / id).string()},
                  environment(),
