@@ -40,7 +40,7 @@ std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& d
       {"Light enters by", std::string(to_string(data.dataset.lit_face))},
       {"Camera sees", std::string(to_string(data.dataset.seen_face))},
       {"Model error",
-       fmt::format("{} % of each datum, on top of its measured noise",
+       fmt::format("{} % of each datum and of its picture, on top of the measured noise",
                    100.0 * options.model_error)},
       {"Smoothness", fmt::format("weight {}", options.regularization)},
       {"Calibration",

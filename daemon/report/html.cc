@@ -33,6 +33,7 @@ figcaption { color: var(--soft); font-size: .85rem; line-height: 1.4; padding: .
 .sheet { display: grid; grid-template-columns: repeat(auto-fill, minmax(118px, 1fr)); gap: .7rem; }
 .plot { overflow-x: auto; margin: .7rem 0 1.2rem; }
 .plot svg { display: block; max-width: 100%; height: auto; }
+svg [color="black"] { color: inherit; }
 svg [stroke="black"] { stroke: currentColor; }
 svg [fill="black"] { fill: currentColor; }
 svg image { image-rendering: pixelated; }

@@ -43,6 +43,19 @@ void set(Image<std::uint8_t>& picture, int x, int y, const Color& color) {
   for (int c = 0; c < 3; ++c) picture.at(x, y, c) = code(color[c]);
 }
 
+/// Of at least one value.
+double quantile_of(std::vector<float>& values, double share) {
+  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  return values[static_cast<std::size_t>(place)];
+}
+
+float mean_difference(const Image<float>& a, const Image<float>& b, int x, int y) {
+  float sum = 0.0F;
+  for (int c = 0; c < 3; ++c) sum += a.at(x, y, c) - b.at(x, y, c);
+  return sum / 3.0F;
+}
+
 }  // namespace
 
 double white_point(const Image<float>& radiance, double quantile) {
@@ -54,11 +67,7 @@ double white_point(const Image<float>& radiance, double quantile) {
       if (most > 0.0F && std::isfinite(most)) brightest.push_back(most);
     }
   }
-  if (brightest.empty()) return 1.0;
-  const auto place =
-      static_cast<std::ptrdiff_t>(quantile * static_cast<double>(brightest.size() - 1));
-  std::nth_element(brightest.begin(), brightest.begin() + place, brightest.end());
-  return brightest[static_cast<std::size_t>(place)];
+  return brightest.empty() ? 1.0 : quantile_of(brightest, quantile);
 }
 
 Image<std::uint8_t> tone_mapped(const Image<float>& radiance, double white) {
@@ -81,12 +90,24 @@ Image<std::uint8_t> difference_picture(const Image<float>& relit,
   Image<std::uint8_t> picture(relit.width(), relit.height(), 3);
   for (int y = 0; y < relit.height(); ++y) {
     for (int x = 0; x < relit.width(); ++x) {
-      double difference = 0.0;
-      for (int c = 0; c < 3; ++c) difference += (relit.at(x, y, c) - captured.at(x, y, c)) / 3.0;
+      const double difference = mean_difference(relit, captured, x, y);
       set(picture, x, y, counts.at(x, y) != 0 ? diverging(difference / range) : kGrey);
     }
   }
   return picture;
+}
+
+double difference_size(const Image<float>& relit,
+                       const Image<float>& captured,
+                       const Image<std::uint8_t>& counts,
+                       double quantile) {
+  std::vector<float> sizes;
+  for (int y = 0; y < counts.height(); ++y) {
+    for (int x = 0; x < counts.width(); ++x) {
+      if (counts.at(x, y) != 0) sizes.push_back(std::abs(mean_difference(relit, captured, x, y)));
+    }
+  }
+  return sizes.empty() ? 0.0 : quantile_of(sizes, quantile);
 }
 
 void mark(Image<std::uint8_t>& picture, const Image<std::uint8_t>& marks) {

@@ -20,6 +20,12 @@ Image<std::uint8_t> difference_picture(const Image<float>& relit,
                                        const Image<std::uint8_t>& counts,
                                        double range);
 
+/// The size of the difference that only a share 1 - `quantile` of the pixels exceeds.
+double difference_size(const Image<float>& relit,
+                       const Image<float>& captured,
+                       const Image<std::uint8_t>& counts,
+                       double quantile);
+
 /// Pixels that are set become magenta.
 void mark(Image<std::uint8_t>& picture, const Image<std::uint8_t>& marks);
 

@@ -36,14 +36,15 @@ std::string gnuplot_number(double value) {
 std::string preamble(std::string_view name, int width, int height) {
   return fmt::format(
       "set terminal svg size {},{} dynamic standalone noenhanced font 'sans-serif,12' name {}\n"
-      "set encoding utf8\nset datafile missing 'NaN'\nset border lc rgb 'black'\n",
+      "set encoding utf8\nset datafile missing 'NaN'\n",
       width,
       height,
       gnuplot_string(name));
 }
 
-/// The SVG element without the XML declaration before it.
-Result<std::string> run_gnuplot(const std::string& script, std::stop_token stop) {
+/// The SVG element without the XML declaration before it, as wide as it was drawn where there is
+/// room.
+Result<std::string> run_gnuplot(const std::string& script, int width, std::stop_token stop) {
   auto svg = run_program({"gnuplot", "-"}, script, kDeadline, std::move(stop));
   if (!svg && svg.error().code == ErrorCode::kUnavailable) {
     return unavailable(svg.error().message +
@@ -52,7 +53,7 @@ Result<std::string> run_gnuplot(const std::string& script, std::stop_token stop)
   if (!svg) return svg.error();
   const std::size_t begin = svg->find("<svg");
   if (begin == std::string::npos) return internal_error("gnuplot drew nothing");
-  return svg->substr(begin);
+  return fmt::format("<svg width=\"{}\"{}", width, svg->substr(begin + 4));
 }
 
 std::string level_line(double level, const std::string& title) {
@@ -78,33 +79,55 @@ std::string matrix(const Image<float>& values) {
   return text;
 }
 
-/// Where panel `index` lies, as shares of the whole drawing; the scale has the right margin.
-std::string placement(const MapPlot& plot, int index, int width, int height) {
+// Room around the panels, px: axes are written once, at the left and at the bottom.
+constexpr double kLeft = 56.0;
+constexpr double kBottom = 50.0;
+constexpr double kRight = 110.0;
+constexpr double kGap = 46.0;    // between panels, beside each other
+constexpr double kTitle = 60.0;  // above each, with the tics of the one before
+
+struct Layout {
+  int rows;
+  double width;
+  double height;
+};
+
+Layout layout_of(const MapPlot& plot) {
   const int rows = (static_cast<int>(plot.panels.size()) + plot.columns - 1) / plot.columns;
-  const int column = index % plot.columns;
-  const int row = index / plot.columns;
-  const double left = column * plot.panel_width + 46.0;
-  const double bottom = (rows - 1 - row) * plot.panel_height + 38.0;
+  return {rows,
+          kLeft + plot.columns * (plot.panel_width + kGap) + kRight,
+          kBottom + rows * (plot.panel_height + kTitle)};
+}
+
+/// Where panel `index` lies, as shares of the whole drawing.
+std::string placement(const MapPlot& plot, const Layout& layout, int index) {
+  const double left = kLeft + index % plot.columns * (plot.panel_width + kGap);
+  const double bottom =
+      kBottom + (layout.rows - 1 - index / plot.columns) * (plot.panel_height + kTitle);
   return fmt::format(
       "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
       "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n",
-      left / width,
-      (left + plot.panel_width - 62.0) / width,
-      bottom / height,
-      (bottom + plot.panel_height - 62.0) / height);
+      left / layout.width,
+      (left + plot.panel_width) / layout.width,
+      bottom / layout.height,
+      (bottom + plot.panel_height) / layout.height);
 }
 
 std::string panel_script(const MapPlot& plot, int index) {
   const MapPanel& panel = plot.panels[index];
   const double sx = panel.pixel_width;
   const double sy = panel.pixel_height;
+  const bool is_lowest = index + plot.columns >= static_cast<int>(plot.panels.size());
+  // A panel that has another y axis than the one beside it says so.
+  const bool has_own_y =
+      index % plot.columns == 0 || plot.panels[index - 1].y_label != panel.y_label;
   return fmt::format(
-      "set title {} offset 0,-0.6\nset xlabel {} offset 0,0.6\nset ylabel {} offset 1,0\n"
+      "set title {} offset 0,-0.7\nset xlabel {} offset 0,0.5\nset ylabel {} offset 1.5,0\n"
       "set xrange [0:{}]\nset yrange [0:{}]\n"
       "plot $panel{} matrix using (($1+0.5)*{}):(($2+0.5)*{}):3 with image notitle\n",
       gnuplot_string(panel.title),
-      gnuplot_string(panel.x_label),
-      gnuplot_string(panel.y_label),
+      gnuplot_string(is_lowest ? panel.x_label : ""),
+      gnuplot_string(has_own_y ? panel.y_label : ""),
       panel.values.width() * sx,
       panel.values.height() * sy,
       index,
@@ -112,27 +135,17 @@ std::string panel_script(const MapPlot& plot, int index) {
       sy);
 }
 
-/// The colour scale, as a narrow map of its own at the right.
-std::string scale_script(const MapPlot& plot, int width, int height) {
-  const double left = width - 96.0;
-  const double tall = std::min(plot.panel_height * 1.6, height - 76.0);
+/// The colour scale stands at the right, drawn with the first panel.
+std::string scale_script(const MapPlot& plot, const Layout& layout) {
+  const double tall = std::min(1.5 * plot.panel_height, layout.height - kBottom - kTitle);
   return fmt::format(
-      "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
-      "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n"
-      "unset title\nunset xlabel\nunset ylabel\nunset xtics\nunset ytics\n"
-      "set y2tics out nomirror\nset y2label {} offset 0,0\n"
-      "set xrange [0:1]\nset yrange [{}:{}]\nset y2range [{}:{}]\n"
-      "set isosamples 2,128\nset samples 2,128\n"
-      "plot '++' using 1:2:2 with image notitle\n",
-      left / width,
-      (left + 16.0) / width,
-      (height - tall) / 2 / height,
-      (height + tall) / 2 / height,
-      gnuplot_string(plot.scale_label),
-      plot.lowest,
-      plot.highest,
-      plot.lowest,
-      plot.highest);
+      "set colorbox vertical user origin screen {:.5f}, screen {:.5f} size screen {:.5f}, screen "
+      "{:.5f}\nset cblabel {} offset 0.5,0\nset cbtics out\n",
+      (layout.width - kRight + 4.0) / layout.width,
+      (layout.height - kTitle + 20.0 - tall) / layout.height,
+      14.0 / layout.width,
+      tall / layout.height,
+      gnuplot_string(plot.scale_label));
 }
 
 }  // namespace
@@ -158,7 +171,7 @@ Result<std::string> draw(const CurvePlot& plot, std::string_view name, std::stop
                           gnuplot_string(plot.series[s].title));
   }
   script += "plot " + curves + level_line(plot.level, plot.level_title) + "\n";
-  return run_gnuplot(script, std::move(stop));
+  return run_gnuplot(script, 720, std::move(stop));
 }
 
 Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_token stop) {
@@ -181,42 +194,48 @@ Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_t
                           gnuplot_string(plot.series[s].title));
   }
   script += level_line(plot.level, plot.level_title) + "\n";
-  return run_gnuplot(script, std::move(stop));
+  return run_gnuplot(script, 960, std::move(stop));
 }
 
 Result<std::string> draw(const MapPlot& plot, std::string_view name, std::stop_token stop) {
+  const Layout layout = layout_of(plot);
   const int panels = static_cast<int>(plot.panels.size());
-  const int rows = (panels + plot.columns - 1) / plot.columns;
-  const int width = plot.columns * plot.panel_width + 100;
-  const int height = rows * plot.panel_height + 8;
-  std::string script = preamble(name, width, height);
+  std::string script =
+      preamble(name, static_cast<int>(layout.width), static_cast<int>(layout.height));
   script += plot.diverging ? kDiverging : kSequential;
-  script += fmt::format("\nset cbrange [{}:{}]\nunset colorbox\nunset key\nset tics out nomirror\n",
-                        plot.lowest,
-                        plot.highest);
+  script += fmt::format(
+      "\nset cbrange [{}:{}]\nunset key\nset tics out nomirror\n", plot.lowest, plot.highest);
   for (int i = 0; i < panels; ++i) {
     script += fmt::format("$panel{} << EOD\n{}EOD\n", i, matrix(plot.panels[i].values));
   }
-  script += "set multiplot\n";
+  script += scale_script(plot, layout) + "set multiplot\n";
   for (int i = 0; i < panels; ++i) {
-    script += placement(plot, i, width, height) + panel_script(plot, i);
+    script += placement(plot, layout, i) + panel_script(plot, i) + "unset colorbox\n";
   }
-  script += scale_script(plot, width, height) + "unset multiplot\n";
-  return run_gnuplot(script, std::move(stop));
+  return run_gnuplot(script + "unset multiplot\n", static_cast<int>(layout.width), std::move(stop));
 }
 
 Result<std::string> draw(const ScalePlot& plot, std::string_view name, std::stop_token stop) {
+  constexpr int kSteps = 128;
+  Image<float> ramp(kSteps, 2, 1);
+  for (int x = 0; x < kSteps; ++x) {
+    const double share = (x + 0.5) / kSteps;
+    const double value = plot.lowest + share * (plot.highest - plot.lowest);
+    ramp.at(x, 0) = ramp.at(x, 1) = static_cast<float>(value);
+  }
   const std::string script =
-      preamble(name, 420, 64) + std::string(kDiverging) +
+      preamble(name, 420, 84) + std::string(kDiverging) +
       fmt::format(
-          "\nset cbrange [{0}:{1}]\nset xrange [{0}:{1}]\nset yrange [0:1]\n"
+          "\nset cbrange [{0}:{1}]\nset xrange [{0}:{1}]\nset yrange [0:2]\n"
           "unset colorbox\nunset key\nunset ytics\nset xtics out nomirror\nset xlabel {2}\n"
-          "set lmargin 2\nset rmargin 2\nset tmargin 0.2\nset samples 128,2\nset isosamples 128,2\n"
-          "plot '++' using 1:2:1 with image notitle\n",
+          "set lmargin 2\nset rmargin 2\nset tmargin 0.3\nset bmargin 3.2\n$ramp << EOD\n{3}EOD\n"
+          "plot $ramp matrix using ({0}+($1+0.5)*{4}):($2+0.5):3 with image notitle\n",
           plot.lowest,
           plot.highest,
-          gnuplot_string(plot.label));
-  return run_gnuplot(script, std::move(stop));
+          gnuplot_string(plot.label),
+          matrix(ramp),
+          (plot.highest - plot.lowest) / kSteps);
+  return run_gnuplot(script, 420, std::move(stop));
 }
 
 }  // namespace opaline::daemon

@@ -51,8 +51,8 @@ struct MapPanel {
 struct MapPlot {
   std::vector<MapPanel> panels;
   int columns = 4;
-  int panel_width = 200;  ///< of the drawing, px
-  int panel_height = 200;
+  int panel_width = 170;  ///< px
+  int panel_height = 170;
   std::string scale_label;
   double lowest = 0.0;
   double highest = 1.0;

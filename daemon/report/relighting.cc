@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -43,11 +44,31 @@ std::optional<FaceCell> cell_seen_by(const CameraModel& camera,
   return FaceCell{column, row};
 }
 
-bool is_covered_around(const Image<float>& rendered, int x, int y, int margin) {
+/// 1 where a pixel's middle sees the face, fully covered, on a cell that the mask keeps; 2 where the
+/// mask leaves the cell out; 0 elsewhere.
+Image<std::uint8_t> views_of_face(const Image<float>& rendered,
+                                  const CameraModel& camera,
+                                  const Block& block,
+                                  Face face,
+                                  const Image<std::uint8_t>& cell_mask) {
+  Image<std::uint8_t> views(rendered.width(), rendered.height(), 1);
+  for (int y = 0; y < views.height(); ++y) {
+    for (int x = 0; x < views.width(); ++x) {
+      if (rendered.at(x, y, 3) < 0.999F) continue;
+      const auto cell = cell_seen_by(camera, block, face, {x + 0.5, y + 0.5});
+      if (cell) views.at(x, y) = cell_mask.at(cell->column, cell->row) != 0 ? 1 : 2;
+    }
+  }
+  return views;
+}
+
+bool sees_face_around(const Image<std::uint8_t>& views, int x, int y, int margin) {
+  if (x < margin || y < margin || x + margin >= views.width() || y + margin >= views.height()) {
+    return false;
+  }
   for (int v = y - margin; v <= y + margin; ++v) {
     for (int u = x - margin; u <= x + margin; ++u) {
-      if (u < 0 || v < 0 || u >= rendered.width() || v >= rendered.height()) return false;
-      if (rendered.at(u, v, 3) < 0.999F) return false;
+      if (views.at(u, v) == 0) return false;
     }
   }
   return true;
@@ -61,6 +82,24 @@ Image<float> without_coverage(const Image<float>& rgba) {
     }
   }
   return rgb;
+}
+
+/// Root mean square of each channel over the cells that can be used.
+std::array<double, kColorChannels> levels_of(const Illumination& light) {
+  std::array<double, kColorChannels> levels{};
+  std::size_t count = 0;
+  for (int y = 0; y < light.mask.height(); ++y) {
+    for (int x = 0; x < light.mask.width(); ++x) {
+      if (light.mask.at(x, y) == 0) continue;
+      for (int c = 0; c < kColorChannels; ++c) {
+        levels[c] += std::pow(light.radiance.at(x, y, c), 2.0);
+      }
+      ++count;
+    }
+  }
+  for (double& level : levels)
+    level = std::sqrt(level / static_cast<double>(std::max<std::size_t>(count, 1)));
+  return levels;
 }
 
 ChannelErrors compare(const RelitLight& light, const HdrPicture& captured) {
@@ -85,12 +124,11 @@ Image<std::uint8_t> pixels_that_count(const Image<float>& rendered,
                                       Face seen_face,
                                       const Image<std::uint8_t>& cell_mask,
                                       int margin) {
+  const auto views = views_of_face(rendered, camera, block, seen_face, cell_mask);
   Image<std::uint8_t> counts(rendered.width(), rendered.height(), 1);
   for (int y = 0; y < counts.height(); ++y) {
     for (int x = 0; x < counts.width(); ++x) {
-      if (!is_covered_around(rendered, x, y, margin)) continue;
-      const auto cell = cell_seen_by(camera, block, seen_face, {x + 0.5, y + 0.5});
-      counts.at(x, y) = cell && cell_mask.at(cell->column, cell->row) != 0 ? 1 : 0;
+      counts.at(x, y) = views.at(x, y) == 1 && sees_face_around(views, x, y, margin) ? 1 : 0;
     }
   }
   return counts;
@@ -138,6 +176,7 @@ SurfaceFit fit_on_surface(const Dataset& dataset,
                  surface_radiance(field, dataset.seen_face, dataset.view_cosine),
                  {},
                  0.0};
+  const auto levels = levels_of(light);
   double chi_squared = 0.0;
   std::size_t count = 0;
   for (int row = 0; row < light.mask.height(); ++row) {
@@ -148,7 +187,7 @@ SurfaceFit fit_on_surface(const Dataset& dataset,
         const double variance = light.radiance_variance.at(column, row, c);
         const double difference = fit.predicted.at(column, row, c) - measured;
         fit.errors.channels[c].add(fit.predicted.at(column, row, c), measured, variance);
-        const double model = model_error * measured;
+        const double model = model_error * std::hypot(measured, levels[c]);
         chi_squared += difference * difference / (variance + model * model);
         ++count;
       }

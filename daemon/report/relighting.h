@@ -32,11 +32,11 @@ struct SurfaceFit {
   bool held_out = false;
   Image<float> predicted;              ///< L on the seen face, 3 channels
   ChannelErrors errors;                ///< over unmasked cells
-  double chi_squared_per_datum = 0.0;  ///< with the model error among the variance
+  double chi_squared_per_datum = 0.0;  ///< as the reconstruction weighs data: InverseOptions
 };
 
-/// Which pixels see the sample well inside: covered, and not within `margin` pixels of its outline,
-/// where the lens blurs it with the background; and not on cells that the mask leaves out.
+/// Which pixels see the seen face well inside, not within `margin` pixels of its outline, where the
+/// lens blurs it with what is beside it; and not cells that the mask leaves out.
 Image<std::uint8_t> pixels_that_count(const Image<float>& rendered,
                                       const CameraModel& camera,
                                       const Block& block,
@@ -53,7 +53,8 @@ Result<RelitLight> relight(render::Renderer& renderer,
                            const HdrPicture& captured,
                            std::stop_token stop);
 
-/// Compares the field with the illumination's cells of the seen face.
+/// Compares the field with the illumination's cells of the seen face. `model_error` is that of
+/// reconstruct::InverseOptions.
 SurfaceFit fit_on_surface(const Dataset& dataset,
                           const Illumination& light,
                           const render::SurfaceField& field,

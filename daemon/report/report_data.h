@@ -40,7 +40,8 @@ struct ReportData {
   SessionFacts facts;
   std::string solver;
   std::string renderer;
-  double white = 1.0;  ///< radiance shown as white
+  double white = 1.0;       ///< radiance shown as white
+  double difference = 0.1;  ///< share of white at the ends of the difference pictures' scale
 
   /// Over all held-out lights.
   ChannelErrors relighting() const {

@@ -66,15 +66,13 @@ class Page {
   std::optional<Error> error_;
 };
 
-double difference_range(const ReportData& data) { return round_up(0.05 * data.white); }
-
 void add_trio(const RelitLight& light, const ReportData& data, Page& page) {
   const ErrorSums sums = light.errors.all();
   page.add("<div class=\"trio\">\n");
   page.add_picture(tone_mapped(light.captured, data.white), light.name + ", captured");
   page.add_picture(tone_mapped(light.relit, data.white), "relit");
   page.add_picture(
-      difference_picture(light.relit, light.captured, light.counts, difference_range(data)),
+      difference_picture(light.relit, light.captured, light.counts, data.difference * data.white),
       fmt::format(
           "difference; error {}, noise {}", percent(sums.relative()), percent(sums.floor())));
   page.add("</div>\n");
@@ -101,8 +99,8 @@ void add_key_figures(const ReportData& data, Page& page) {
                    fmt::format("BSSRDF error E against stored light transport; its noise: {:.4f}",
                                e.squared_floor())));
   }
-  page.add(
-      key_figure(seconds_text(data.facts.total_seconds()), "from the first exposure to this page"));
+  page.add(key_figure(seconds_text(data.facts.total_seconds()),
+                      "of work: capture, reconstruction and this report"));
   const Block& block = data.material.block;
   page.add(key_figure(fmt::format("{}×{}×{}", block.nx, block.ny, block.nz),
                       "cells, absorption and scattering in each, per colour channel"));
@@ -110,12 +108,10 @@ void add_key_figures(const ReportData& data, Page& page) {
 }
 
 void add_header(const ReportData& data, Page& page) {
-  page.add(fmt::format(
-      "<header><h1>{}</h1>\n<p>Session {} on station {}: a material and the pictures to judge it "
-      "by.</p>\n<nav>",
-      html::escaped(data.config.sample_name),
-      html::escaped(data.session_id),
-      html::escaped(data.config.rig.station)));
+  page.add(fmt::format("<header><h1>{}</h1>\n<p>Session {}, station {}</p>\n<nav>",
+                       html::escaped(data.config.sample_name),
+                       html::escaped(data.session_id),
+                       html::escaped(data.config.rig.station)));
   for (const auto& [id, title] : {std::pair{"relighting", "Relighting"},
                                   {"capture", "Capture"},
                                   {"fit", "Fit"},
@@ -146,10 +142,10 @@ void add_relighting(const ReportData& data, Page& page) {
                                   "channels; grey pixels do not count: "
                                   "background, the lens-blurred outline, saturated or masked ones.",
                                   data.white)));
-  page.add_plot(ScalePlot{"relit minus captured, % of white",
-                          -100.0 * difference_range(data) / data.white,
-                          100.0 * difference_range(data) / data.white},
-                "Scale of the difference pictures");
+  page.add_plot(
+      ScalePlot{
+          "relit minus captured, % of white", -100.0 * data.difference, 100.0 * data.difference},
+      "Scale of the difference pictures");
   for (const RelitLight& light : data.lights) add_trio(light, data, page);
   Rows rows;
   for (const RelitLight& light : data.lights) {
@@ -167,7 +163,7 @@ void add_capture(const ReportData& data, Page& page) {
   page.begin("capture", "Captured HDR pictures");
   page.add(html::paragraph(fmt::format(
       "{} lights, each picture to its own scale; pixels saturated even in the shortest exposure "
-      "are magenta. {} taken again after a bad frame.",
+      "are magenta. Lights taken again after a bad frame: {}.",
       data.contacts.size(),
       data.facts.regions_retaken)));
   for (const std::string& why : data.facts.unusable) {

@@ -44,7 +44,7 @@ std::string_view label_of(Coefficient coefficient) {
 MapPanel flat_cut(
     const Material& m, Coefficient what, int channel, int k, std::string_view prefix) {
   const Block& b = m.block;
-  MapPanel panel{fmt::format("{}z = {:.3g} mm", prefix, (k + 0.5) * b.hz),
+  MapPanel panel{fmt::format("{}z = {:.4g} mm", prefix, (k + 0.5) * b.hz),
                  Image<float>(b.nx, b.ny, 1),
                  b.hx,
                  b.hy,
@@ -62,7 +62,7 @@ MapPanel flat_cut(
 MapPanel deep_cut(const Material& m, Coefficient what, int channel, std::string_view prefix) {
   const Block& b = m.block;
   const int j = b.ny / 2;
-  MapPanel panel{fmt::format("{}y = {:.3g} mm", prefix, (j + 0.5) * b.hy),
+  MapPanel panel{fmt::format("{}y = {:.4g} mm", prefix, (j + 0.5) * b.hy),
                  Image<float>(b.nx, b.nz, 1),
                  b.hx,
                  b.hz,
@@ -144,7 +144,7 @@ CurvePlot convergence_plot(const ReportData& data) {
     plot.series.push_back(std::move(series));
   }
   plot.level = data.config.reconstruction.discrepancy;
-  plot.level_title = "explained to the noise";
+  plot.level_title = "stops here";
   return plot;
 }
 
@@ -168,7 +168,7 @@ BarPlot fit_plot(const ReportData& data) {
 MapPlot residual_plot(const ReportData& data, bool held_out) {
   MapPlot plot;
   plot.diverging = true;
-  plot.scale_label = "predicted minus measured, % of the brightest";
+  plot.scale_label = "residual, % of the brightest cell";
   const Block& block = data.dataset.block;
   const int axis = axis_of(data.dataset.seen_face);
   const std::array<double, 3> h = block.spacing();
@@ -190,6 +190,7 @@ MapPlot residual_plot(const ReportData& data, bool held_out) {
 MapPlot slices_plot(const ReportData& data, Coefficient coefficient, int channel) {
   MapPlot plot;
   plot.columns = 5;
+  plot.panel_width = plot.panel_height = 130;
   plot.scale_label = label_of(coefficient);
   add_cuts(data.material, coefficient, channel, data.truth ? "found, " : "", plot);
   if (data.truth) add_cuts(*data.truth, coefficient, channel, "truth, ", plot);

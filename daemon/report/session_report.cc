@@ -136,6 +136,12 @@ Result<void> SessionReport::compare_all(render::Renderer& renderer) {
     white = std::max(white, white_point(light.captured, data_.config.preview.white_quantile));
   }
   data_.white = white > 0.0 ? white : 1.0;
+  double difference = 0.0;
+  for (const RelitLight& light : data_.lights) {
+    difference =
+        std::max(difference, difference_size(light.relit, light.captured, light.counts, 0.998));
+  }
+  data_.difference = round_up(difference / data_.white);
   if (auto made = job_.files.make_directories(job_.session.preview()); !made) return made;
   for (const RelitLight& light : data_.lights) {
     if (auto written = write_pictures(light); !written) return written;
@@ -195,7 +201,7 @@ Result<void> SessionReport::write_image(const std::string& name,
 }
 
 Result<void> SessionReport::write_pictures(const RelitLight& light) {
-  const double range = round_up(0.05 * data_.white);
+  const double range = data_.difference * data_.white;
   struct Output {
     const char* ending;
     ImageFile image;
