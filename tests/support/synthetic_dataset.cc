@@ -122,9 +122,13 @@ Dataset make_synthetic_dataset(const SyntheticOptions& options) {
         dark(block, name, held_out, region(block, x * dx, y * dy, dx, dy)));
     fine_light.push_back(region(fine, x * dx, y * dy, dx, dy));
   };
-  for (int k = 0; k < n * n; ++k) add("region_" + std::to_string(k), false, k % n, k / n);
+  for (int k = 0; k < n * n; ++k) {
+    const int row = k / n;
+    add("region_" + std::to_string(k), false, k % n, row);
+  }
   for (int k = 0; k < (n - 1) * (n - 1); ++k) {
-    add("held_out_" + std::to_string(k), true, k % (n - 1) + 0.5, k / (n - 1) + 0.5);
+    const int row = k / (n - 1);
+    add("held_out_" + std::to_string(k), true, k % (n - 1) + 0.5, row + 0.5);
   }
   const auto boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, kIor);
   for (int channel = 0; channel < kColorChannels; ++channel) {
