@@ -117,7 +117,7 @@ Result<void> Sequence::prepare(std::stop_token stop) {
   const auto count = [&](bool held_out) {
     return std::ranges::count(patterns_.lights, held_out, &Light::held_out);
   };
-  const auto noted =
+  auto noted =
       work_.events.fact("capture.planned", {{"regions", count(false)}, {"held_out", count(true)}});
   if (!noted) return noted;
   if (auto black = take_black(stop); !black) return black;
@@ -175,7 +175,7 @@ Result<std::optional<std::vector<CapturedFrame>>> Sequence::load(const std::stri
     return fits ? *std::move(loaded) : Loaded();
   }
   log::warning("{}; {} is taken again", loaded.error().message, name);
-  const auto noted =
+  auto noted =
       work_.events.fact("region.damaged", {{"region", name}, {"message", loaded.error().message}});
   if (!noted) return noted.error();
   return Loaded();
@@ -276,7 +276,7 @@ Result<void> Sequence::confirm_lamp(const std::string& region, std::stop_token s
 Result<void> Sequence::note_unusable(const Light& light, std::string_view why) {
   log::warning("{} is masked: {}", light.name, why);
   summary_.unusable.push_back(light.name);
-  const auto noted =
+  auto noted =
       work_.events.fact("region.unusable", {{"region", light.name}, {"message", std::string(why)}});
   if (!noted || light.held_out) return noted;
   ++unusable_regions_;
