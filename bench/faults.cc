@@ -1,6 +1,5 @@
 // Kills the jobs of tiny sessions with SIGKILL at seeded moments, starts them again, and counts how many sessions
-// complete and come out bit-equal to an undisturbed one. Prints one JSON object a figure:
-// {"name": ..., "case": ..., "value": ..., "unit": ...}.
+// complete and come out bit-equal to an undisturbed one. Prints one JSON object a figure (bench/figure.h).
 //
 //   faults [--captures N] [--reconstructions N] [--seed N]
 
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "bench/faults/fault_bed.h"
+#include "bench/figure.h"
 
 namespace opaline::bench {
 namespace {
@@ -42,14 +42,6 @@ std::optional<Arguments> parse(int argc, char** argv) {
     if (parsed.ptr != text.data() + text.size() || *value < 0) return std::nullopt;
   }
   return arguments;
-}
-
-void print_figure(std::string_view name, int value, std::string_view unit) {
-  fmt::print(R"({{"name": "{}", "case": "tiny", "value": {}, "unit": "{}"}})"
-             "\n",
-             name,
-             value,
-             unit);
 }
 
 struct Tally {
@@ -136,18 +128,18 @@ int run(const Arguments& arguments) {
   if (arguments.captures > 0) {
     const auto tally = kill_captures(**bed, arguments);
     if (!tally) return fail(tally.error());
-    print_figure("faults.capture_sessions", arguments.captures, "sessions");
-    print_figure("faults.capture_kills", tally->kills, "kills");
-    print_figure("faults.capture_completed", tally->completed, "sessions");
-    print_figure("faults.capture_bit_equal", tally->bit_equal, "sessions");
+    print_figure("faults.capture_sessions", "tiny", arguments.captures, "sessions");
+    print_figure("faults.capture_kills", "tiny", tally->kills, "kills");
+    print_figure("faults.capture_completed", "tiny", tally->completed, "sessions");
+    print_figure("faults.capture_bit_equal", "tiny", tally->bit_equal, "sessions");
   }
   if (arguments.reconstructions > 0) {
     const auto tally = kill_reconstructions(**bed, arguments);
     if (!tally) return fail(tally.error());
-    print_figure("faults.reconstruct_sessions", arguments.reconstructions, "sessions");
-    print_figure("faults.reconstruct_kills", tally->kills, "kills");
-    print_figure("faults.reconstruct_completed", tally->completed, "sessions");
-    print_figure("faults.reconstruct_bit_equal", tally->bit_equal, "sessions");
+    print_figure("faults.reconstruct_sessions", "tiny", arguments.reconstructions, "sessions");
+    print_figure("faults.reconstruct_kills", "tiny", tally->kills, "kills");
+    print_figure("faults.reconstruct_completed", "tiny", tally->completed, "sessions");
+    print_figure("faults.reconstruct_bit_equal", "tiny", tally->bit_equal, "sessions");
   }
   return 0;
 }

@@ -3,19 +3,19 @@
 //
 //   forward_solve [--case NAME] [--rounds N] [--no-eigen]
 //
-// prints one JSON object a figure: {"name": ..., "case": ..., "value": ..., "unit": ...}.
+// prints one JSON object a figure (bench/figure.h).
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <chrono>
-#include <cstdio>
 #include <optional>
 #include <string_view>
 #include <thread>
 #include <vector>
 
+#include "bench/figure.h"
 #include "bench/forward/forward_case.h"
 #include "reconstruct/host/host_solver.h"
 
@@ -53,25 +53,8 @@ std::optional<Arguments> parse(int count, char** words) {
   return arguments;
 }
 
-void print_figure(std::string_view name,
-                  std::string_view problem,
-                  double value,
-                  std::string_view unit) {
-  fmt::print("{{\"name\": \"{}\", \"case\": \"{}\", \"value\": {:.4g}, \"unit\": \"{}\"}}\n",
-             name,
-             problem,
-             value,
-             unit);
-  std::fflush(stdout);
-}
-
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 /// a = b + 3 c over 3 x 64 MiB on every core, bytes as the program sees them, best of five: what memory can give.

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include <cstdio>
 
 #include "base/clock.h"
 #include "base/io/transport_io.h"
+#include "bench/figure.h"
 #include "bench/transport_dataset.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/inverse_solver.h"
@@ -19,12 +19,6 @@
 
 namespace opaline::bench {
 namespace {
-
-void print(const char* figure, const std::string& which, double value, const char* unit) {
-  const nlohmann::ordered_json line{
-      {"figure", figure}, {"case", which}, {"value", value}, {"unit", unit}};
-  std::printf("%s\n", line.dump().c_str());
-}
 
 Dataset only(const Dataset& dataset, const std::string& kind) {
   Dataset some = dataset;
@@ -47,15 +41,15 @@ Result<void> judge(const char* which,
     const bool held_out = std::string_view(kind) != "region";
     const auto error = reconstruct::relighting_error(some, *pictures, held_out);
     const std::string name = fmt::format("{}, {}", which, *kind == 0 ? "held out" : kind);
-    print("inverse.relighting_error", name, error.error, "");
-    print("inverse.noise_floor", name, error.noise_floor, "");
+    print_figure("inverse.relighting_error", name, error.error, "");
+    print_figure("inverse.noise_floor", name, error.noise_floor, "");
   }
   const Dataset patches = patch_dataset(responses);
   const auto predicted = reconstruct::predict(patches, material, options, solver, {});
   if (!predicted) return predicted.error();
   const auto error = reconstruct::relighting_error(patches, *predicted, true);
-  print("inverse.bssrdf_error", which, error.error * error.error, "");
-  print("inverse.bssrdf_error_floor", which, error.noise_floor * error.noise_floor, "");
+  print_figure("inverse.bssrdf_error", which, error.error * error.error, "");
+  print_figure("inverse.bssrdf_error_floor", which, error.noise_floor * error.noise_floor, "");
   return ok();
 }
 
@@ -74,14 +68,14 @@ Result<void> run(const std::string& file,
   if (!result) return result.error();
   for (std::size_t c = 0; c < kColorChannels; ++c) {
     const auto& channel = result->channels[c];
-    print("inverse.chi_squared_per_datum",
-          kChannelNames[c],
-          channel.history.back().chi_squared_per_datum,
-          "");
-    print("inverse.iterations", kChannelNames[c], channel.history.back().iteration, "");
-    print("inverse.solves", kChannelNames[c], static_cast<double>(channel.solves), "");
+    print_figure("inverse.chi_squared_per_datum",
+                 kChannelNames[c],
+                 channel.history.back().chi_squared_per_datum,
+                 "");
+    print_figure("inverse.iterations", kChannelNames[c], channel.history.back().iteration, "");
+    print_figure("inverse.solves", kChannelNames[c], static_cast<double>(channel.solves), "");
   }
-  print("inverse.seconds", "three channels", result->seconds, "s");
+  print_figure("inverse.seconds", "three channels", result->seconds, "s");
   if (const auto scene = sim::scene_from_json(responses->scene)) {
     const auto truth = sim::make_material(*scene);
     if (!truth) return truth.error();

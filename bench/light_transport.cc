@@ -1,11 +1,8 @@
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <vector>
 
 #include "base/log.h"
+#include "bench/figure.h"
 #include "sim/light_transport.h"
 #include "sim/scene.h"
 
@@ -46,14 +43,7 @@ int main() {
     }
     rates.push_back(*rate);
   }
-  std::sort(rates.begin(), rates.end());
-  fmt::print(
-      "{{\"figure\": \"transport.photons_per_second\", \"case\": \"marble\", \"value\": {:.0f}, "
-      "\"unit\": \"photons/s\", "
-      "\"rounds\": {}, \"least\": {:.0f}, \"most\": {:.0f}}}\n",
-      rates[kRounds / 2],
-      kRounds,
-      rates.front(),
-      rates.back());
+  bench::print_figure("transport.photons_per_second", "marble", bench::median(rates), "photons/s");
+  bench::print_figure("transport.rounds", "marble", kRounds, "1");
   return 0;
 }

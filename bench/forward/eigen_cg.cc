@@ -4,6 +4,7 @@
 #include <chrono>
 #include <vector>
 
+#include "bench/figure.h"
 #include "bench/forward/forward_case.h"
 
 namespace opaline::bench {
@@ -80,8 +81,7 @@ EigenRun run_eigen_cg(const ForwardCase& problem, double tolerance, int rounds) 
     seconds.push_back(
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
-  std::nth_element(seconds.begin(), seconds.begin() + rounds / 2, seconds.end());
-  return {seconds[rounds / 2], relative_residual(problem, x)};
+  return {median(std::move(seconds)), relative_residual(problem, x)};
 }
 
 }  // namespace opaline::bench

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+namespace opaline::bench {
+
+/// Prints one figure as a line of its own on standard output, at once:
+/// {"figure": "forward.seconds", "case": "wax1", "value": 0.04, "unit": "s"}.
+void print_figure(std::string_view figure,
+                  std::string_view which,
+                  double value,
+                  std::string_view unit);
+
+/// The middle of at least one value; of an even number the upper of the two.
+double median(std::vector<double> values);
+
+}  // namespace opaline::bench
