@@ -13,6 +13,9 @@
 namespace opaline::reconstruct {
 namespace {
 
+constexpr std::chrono::seconds kBetweenFacts{
+    10};  // a checkpoint is saved more often than is worth a durable line
+
 std::string channel_name(std::size_t channel) { return kChannelNames.at(channel); }
 
 class Reconstruction {
@@ -96,7 +99,10 @@ class Reconstruction {
     checkpoint_.current = progress;
     auto saved = context_.checkpoints->save(checkpoint_);
     checkpoint_.current.reset();
-    return saved;
+    if (!saved || context_.clock.now() - last_said_ < kBetweenFacts) return saved;
+    last_said_ = context_.clock.now();
+    return context_.events.fact("checkpoint.saved",
+                                {{"iteration", progress.report.history.back().iteration}});
   }
 
   Result<void> save() const {
@@ -120,8 +126,9 @@ class Reconstruction {
     Progress progress;
     progress.step = report.history.empty() ? "homogeneous fit" : "reconstruction";
     progress.fraction = (static_cast<double>(channel) + channel_fraction(report)) / kColorChannels;
-    if (progress.fraction > 0.0)
-      progress.seconds_left = seconds() * (1.0 / progress.fraction - 1.0);
+    if (!first_fraction_) first_fraction_ = progress.fraction;  // done by those before us
+    if (const double done = progress.fraction - *first_fraction_; done > 0.0)
+      progress.seconds_left = seconds() * (1.0 - progress.fraction) / done;
     progress.detail["channel"] = channel_name(channel);
     if (!report.history.empty()) {
       const IterationRecord& now = report.history.back();
@@ -136,6 +143,8 @@ class Reconstruction {
   const InverseOptions& options_;
   const InverseContext& context_;
   std::chrono::nanoseconds start_;
+  std::chrono::nanoseconds last_said_ = start_;  // that a checkpoint was saved
+  std::optional<double> first_fraction_;
   Checkpoint checkpoint_;
   InverseResult result_;
 };

@@ -35,7 +35,7 @@ struct InverseContext {
 /// Events:  progress "homogeneous fit" and "reconstruction" {channel, iteration, objective,
 /// chi_squared_per_datum};
 ///          fact "channel.reconstructed" {channel, iterations, chi_squared_per_datum, stop_reason,
-///          seconds}.
+///          seconds}; fact "checkpoint.saved" {iteration}, at most every ten seconds.
 /// Threads: one call at a time per solver.
 /// Errors:  kInvalidArgument for options or a dataset that cannot be used; kCancelled; the
 /// solver's; kUnavailable when
