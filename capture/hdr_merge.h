@@ -61,10 +61,10 @@ struct FrameLight {
   ExposureStatistics statistics;
   double mean_electrons = 0.0;  ///< above black; a clipped pixel counts as what it clipped at
   double mean_deviation = 0.0;  ///< standard deviation of that mean, from noise alone
-  bool lit() const {
-    return statistics.saturated_share > 0.0 || mean_electrons > 8.0 * mean_deviation;
-  }
+  bool stands_out() const { return mean_electrons > 8.0 * mean_deviation; }
+  bool lit() const { return statistics.saturated_share > 0.0 || stands_out(); }
 };
+/// `footprint` without hot pixels: one that saturates counts as light.
 FrameLight measure_light(const CameraCalibration& camera,
                          const ExposurePair& pair,
                          const Image<std::uint8_t>& footprint,

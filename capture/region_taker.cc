@@ -24,6 +24,21 @@ bool can_retry(ErrorCode code) {
 
 }  // namespace
 
+BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
+                         const CameraCalibration& camera,
+                         const Image<std::uint8_t>& seen)
+    : frames_(std::move(frames)), footprint_(seen) {
+  std::vector<const Image<std::uint16_t>*> pictures;
+  for (const CapturedFrame& captured : frames_) pictures.push_back(&captured.frame.pixels);
+  hot_ = find_hot_pixels(camera, pictures);
+  std::ranges::transform(seen.samples(),
+                         hot_.samples(),
+                         footprint_.samples().begin(),
+                         [](std::uint8_t s, std::uint8_t h) {
+                           return static_cast<std::uint8_t>(s != 0 && h == 0 ? 1 : 0);
+                         });
+}
+
 std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const {
   const auto black =
       std::ranges::find(frames_, light.exposure_asked, &CapturedFrame::exposure_asked);
@@ -39,7 +54,7 @@ std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
   // The dimmest lit frame's rate is the least that all others must show.
   std::optional<double> rate;
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    if (!lights[i].lit()) continue;
+    if (!lights[i].stands_out()) continue;
     const double own = lights[i].mean_electrons / times[i];
     rate = rate ? std::min(*rate, own) : own;
   }
@@ -215,7 +230,7 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
       return tl::unexpected(Failure{internal_error("no black frame for this exposure"), "black"});
     }
     lights.push_back(measure_light(
-        settings_.camera, *pair, settings_.footprint, settings_.options.exposures.dark_quantile));
+        settings_.camera, *pair, black.footprint(), settings_.options.exposures.dark_quantile));
     times.push_back(pair->light_seconds);
     bracket.add(*index, lights.back().statistics);
     taken.lit = taken.lit || lights.back().lit();

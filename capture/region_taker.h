@@ -23,17 +23,26 @@
 
 namespace opaline::capture {
 
-/// Black frames by exposure, to subtract.
+/// Black frames by exposure, to subtract, and what they tell of the pixels.
 class BlackFrames {
  public:
   BlackFrames() = default;
-  explicit BlackFrames(std::vector<CapturedFrame> frames) : frames_(std::move(frames)) {}
-  std::span<const CapturedFrame> frames() const { return frames_; }
+  /// `seen` marks the pixels (1) that see the sample.
+  BlackFrames(std::vector<CapturedFrame> frames,
+              const CameraCalibration& camera,
+              const Image<std::uint8_t>& seen);
+  /// Hot pixels: 1.
+  const Image<std::uint8_t>& hot() const { return hot_; }
+  /// Pixels that see the sample and are not hot: 1. Only these tell light from dark, since a hot
+  /// one saturates in a long exposure without any light.
+  const Image<std::uint8_t>& footprint() const { return footprint_; }
   /// The pair of a frame with the black of its exposure; none when there is no such black.
   std::optional<ExposurePair> pair(const CapturedFrame& light) const;
 
  private:
   std::vector<CapturedFrame> frames_;
+  Image<std::uint8_t> hot_;
+  Image<std::uint8_t> footprint_;
 };
 
 /// The frames of one light, and whether any shows light at all.
@@ -55,7 +64,6 @@ class RegionTaker {
   struct Settings {
     CaptureOptions options;
     CameraCalibration camera;
-    Image<std::uint8_t> footprint;  ///< camera pixels that see the sample
   };
   /// Opens the devices. `events` outlives us.
   static Result<std::unique_ptr<RegionTaker>> create(const Station& station,
@@ -122,7 +130,8 @@ class RegionTaker {
 };
 
 /// A frame without light though another of the same bracket proves that there is some: its index.
-/// `lights` are of the frames in any order, `seconds` their exposures.
+/// `lights` are of the frames in any order, `seconds` their exposures; those whose mean stands out
+/// of the noise prove it.
 std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
                                             std::span<const double> seconds);
 

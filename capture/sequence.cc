@@ -121,17 +121,15 @@ Result<void> Sequence::prepare(std::stop_token stop) {
       work_.events.fact("capture.planned", {{"regions", count(false)}, {"held_out", count(true)}});
   if (!noted) return noted;
   if (auto black = take_black(stop); !black) return black;
-  std::vector<const Image<std::uint16_t>*> frames;
-  for (const CapturedFrame& captured : black_.frames()) frames.push_back(&captured.frame.pixels);
-  merge_.emplace(task_.calibration.camera, find_hot_pixels(task_.calibration.camera, frames));
+  merge_.emplace(task_.calibration.camera, black_.hot());
   return ok();
 }
 
 // The devices are opened only when something is left to take.
 Result<RegionTaker*> Sequence::taker() {
   if (taker_) return taker_.get();
-  auto made = RegionTaker::create(
-      station_, {task_.options, task_.calibration.camera, map_.footprint()}, work_.events);
+  auto made =
+      RegionTaker::create(station_, {task_.options, task_.calibration.camera}, work_.events);
   if (!made) return made.error();
   taker_ = *std::move(made);
   if (auto space = check_space(); !space) return space.error();
@@ -185,7 +183,7 @@ Result<void> Sequence::take_black(std::stop_token stop) {
   auto stored = load(kBlackName, patterns_.black);
   if (!stored) return stored.error();
   if (*stored) {
-    black_ = BlackFrames(**std::move(stored));
+    black_ = BlackFrames(**std::move(stored), task_.calibration.camera, map_.footprint());
     return ok();
   }
   auto devices = taker();
@@ -194,7 +192,7 @@ Result<void> Sequence::take_black(std::stop_token stop) {
       patterns_.black, [this](nanoseconds exposure) { report(kBlackName, exposure); }, stop);
   if (!taken) return taken.error();
   if (auto saved = store_.save(kBlackName, patterns_.black, taken->frames); !saved) return saved;
-  black_ = BlackFrames(std::move(taken->frames));
+  black_ = BlackFrames(std::move(taken->frames), task_.calibration.camera, map_.footprint());
   return ok();
 }
 
@@ -217,7 +215,7 @@ Result<std::vector<ExposurePair>> Sequence::pairs_of(const std::string& name,
 
 bool Sequence::shows_light(std::span<const ExposurePair> pairs) const {
   return std::ranges::any_of(pairs, [this](const ExposurePair& pair) {
-    return measure_light(task_.calibration.camera, pair, map_.footprint(), 0.0).lit();
+    return measure_light(task_.calibration.camera, pair, black_.footprint(), 0.0).lit();
   });
 }
 

@@ -64,6 +64,10 @@ class SequenceTest : public ::testing::Test {
     return files;
   }
   void expect_recovers_from(sim::Faults faults, const std::string& fault) {
+    expect_one_retake(std::move(faults), fault);
+    EXPECT_EQ(results_of(dir_.path()), undisturbed());
+  }
+  void expect_one_retake(sim::Faults faults, const std::string& fault) {
     options_.faults = std::move(faults);
     const auto summary = run(dir_.path());
     ASSERT_TRUE(summary) << summary.error().message;
@@ -71,7 +75,6 @@ class SequenceTest : public ::testing::Test {
     const auto retaken = events_->facts("region.retaken");
     ASSERT_EQ(retaken.size(), 1u);
     EXPECT_EQ(retaken[0]["fault"], fault) << retaken[0].dump();
-    EXPECT_EQ(results_of(dir_.path()), undisturbed());
   }
 
   testing::TemporaryDirectory dir_;
@@ -315,6 +318,39 @@ TEST_F(SequenceTest, StopsWhenTheLampIsDeadAndGoesOnAtThatRegion) {
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->taken, 10);
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
+/// One pixel in a hundred is hot: it saturates in the longest exposure, whatever the lamp does.
+class HotSequenceTest : public SequenceTest {
+ protected:
+  HotSequenceTest() { options_.camera.hot_pixel_fraction = 0.01; }
+};
+
+TEST_F(HotSequenceTest, MasksARegionThatIsBlackWhileTheLampWorks) {
+  options_.faults = {{sim::FaultKind::kBlackFrame, kFirstLight + 1, 0, 1000}};
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(summary->unusable, ElementsAre("region_0_1"));
+  const auto again = run(dir_.path());  // from the frames on disk
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_THAT(again->unusable, ElementsAre("region_0_1"));
+}
+
+TEST_F(HotSequenceTest, StopsWhenTheLampIsDead) {
+  options_.faults = {{sim::FaultKind::kBlackFrame, 0, 0, 1000}};
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(summary.error().message, AllOf(HasSubstr("region_0_0"), HasSubstr("lamp")));
+}
+
+TEST_F(HotSequenceTest, RetakesTheRegionWhoseLongestExposureIsBlack) {
+  task_.options.exposures.wanted_snr = 1e9;  // up to the longest
+  const testing::TemporaryDirectory undisturbed;
+  ASSERT_TRUE(run(undisturbed.path()));
+  const int exposures = events_->facts("region.captured")[3]["exposures"];
+  expect_one_retake({{sim::FaultKind::kBlackFrame, kFirstLight + 3, exposures - 1}}, "black");
+  EXPECT_EQ(results_of(dir_.path()), results_of(undisturbed.path()));
 }
 
 TEST_F(SequenceTest, StopsWhenTooManyRegionsAreSaturatedAndSaysWhatWouldHelp) {
