@@ -34,7 +34,8 @@ class LocalProcess final : public JobProcess {
   std::optional<int> exit_;
 };
 
-/// What posix_spawn needs: a session of its own, no signal blocked or ignored, output to a file.
+/// What posix_spawn needs: a session of its own, no signal blocked or ignored, output to a file,
+/// and nothing else open that is open here.
 class SpawnSettings {
  public:
   explicit SpawnSettings(const fs::path& log) {
@@ -51,6 +52,7 @@ class SpawnSettings {
     ::posix_spawn_file_actions_addopen(
         &actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
     ::posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+    ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
   }
   ~SpawnSettings() {
     ::posix_spawnattr_destroy(&attributes);

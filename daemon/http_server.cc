@@ -1,5 +1,6 @@
 #include "daemon/http_server.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <utility>  // Boost 1.74's awaitable.hpp needs it before
@@ -63,6 +64,12 @@ class Counted {
  private:
   std::size_t& count_;
 };
+
+// Asio of Boost 1.74 does not: a program that is started elsewhere would keep our port.
+template <class Socket>
+void close_on_exec(Socket& socket) {
+  ::fcntl(socket.native_handle(), F_SETFD, FD_CLOEXEC);
+}
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -149,6 +156,7 @@ Result<void> HttpServer::Impl::listen_tcp() {
   }
   const Tcp::endpoint endpoint(address, options.port);
   tcp.open(endpoint.protocol(), error);
+  if (!error) close_on_exec(tcp);
   if (!error) tcp.set_option(Tcp::acceptor::reuse_address(true), error);
   if (!error) tcp.bind(endpoint, error);
   if (!error) tcp.listen(net::socket_base::max_listen_connections, error);
@@ -159,7 +167,8 @@ Result<void> HttpServer::Impl::listen_tcp() {
 }
 
 Result<void> HttpServer::Impl::listen_local() {
-  if (connect_unix(options.socket)) {
+  const auto other = connect_unix(options.socket);
+  if (other || other.error().code == ErrorCode::kTimeout) {
     return busy(options.socket.string() + " is served by another opalined");
   }
   Result<FileDescriptor> fd = listen_unix(options.socket);
@@ -184,6 +193,7 @@ net::awaitable<void> HttpServer::Impl::accept_from(Acceptor& acceptor, bool same
       co_await pause.async_wait(into(error));
       continue;
     }
+    close_on_exec(socket);
     Stream stream{Generic::socket(std::move(socket))};
     net::co_spawn(context, serve(std::move(stream), same_user), net::detached);
   }

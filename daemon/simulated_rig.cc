@@ -68,6 +68,7 @@ Result<pid_t> spawn(const RigProcess& process) {
   ::posix_spawn_file_actions_addopen(
       &settings.actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   ::posix_spawn_file_actions_adddup2(&settings.actions, 1, 2);
+  ::posix_spawn_file_actions_addclosefrom_np(&settings.actions, 3);
   ::posix_spawnattr_setflags(&settings.attributes, POSIX_SPAWN_SETSID);
   pid_t pid = 0;
   const int failed =

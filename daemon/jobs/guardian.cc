@@ -58,6 +58,7 @@ class Spawn {
     ::posix_spawnattr_init(&attributes_);
     ::posix_spawn_file_actions_adddup2(&actions_, standard_input, 0);
     ::posix_spawn_file_actions_adddup2(&actions_, standard_output, 1);
+    ::posix_spawn_file_actions_addclosefrom_np(&actions_, 3);
     ::posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSID);
   }
   ~Spawn() {

@@ -43,9 +43,9 @@ class OpalinedTest : public ::testing::Test {
     arguments.insert(arguments.begin(), program(name));
     return std::make_unique<Process>(arguments, environment(), root_.path() / output);
   }
-  void start(const std::vector<std::string>& more = {}) {
+  void start(const std::vector<std::string>& more = {}, std::uint16_t at_port = 0) {
     std::vector<std::string> arguments{
-        "--sessions", sessions_.string(), "--port", "0", "--programs", fakes()};
+        "--sessions", sessions_.string(), "--port", std::to_string(at_port), "--programs", fakes()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     daemon_ = spawn("opalined", arguments, "opalined.out");
     ASSERT_TRUE(eventually([&] { return port() != 0; })) << daemon_->output();

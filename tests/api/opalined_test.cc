@@ -45,12 +45,13 @@ TEST_F(Opalined, KilledItLeavesTheJobRunningAndStartedAgainItFinishesTheSession)
   ASSERT_TRUE(becomes(id, "running"));
   const auto log = sessions_ / id / "events.jsonl";
   ASSERT_TRUE(eventually([&] { return std::filesystem::exists(log); }));
+  const std::uint16_t port_before = port();
 
   daemon_->kill(SIGKILL);
   daemon_->wait();
   const auto size = std::filesystem::file_size(log);
   EXPECT_TRUE(eventually([&] { return std::filesystem::file_size(log) > size; }));
-  start();
+  start({}, port_before);  // the job holds nothing of the first one's
 
   EXPECT_EQ(state_of(id), "running");
   turn_off("capture.hold");
