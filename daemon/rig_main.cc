@@ -177,7 +177,7 @@ Result<void> run(const CLI::App& app, const Arguments& arguments) {
   if (command == "serve") return serve(arguments);
   if (command == "status") return print_status(arguments);
   if (command == "truth") return print_truth(arguments);
-  if (command == "dark") return sim::RigClient(arguments.socket).dark();
+  if (command == "dark") return sim::RigClient(arguments.socket).dark(sim::RigPort::kAnybody);
   if (command == "fault") return add_fault(arguments);
   return sim::RigClient(arguments.socket).end();
 }

@@ -140,13 +140,15 @@ void Rig::close_projector(std::uint64_t session) noexcept {
   darken();
 }
 
-Result<void> Rig::dark() {
+Result<void> Rig::dark(std::uint64_t session) {
   const std::lock_guard lock(mutex_);
+  if (session != projector_session_) projector_session_ = 0;
   darken();
   return ok();
 }
 
 void Rig::darken() {
+  ++darkened_;
   const nanoseconds now = clock_.now();
   const Shown shown = timeline_.at(now);
   if (plan_.strikes(FaultKind::kLampStuck, shown ? shown->id : 0)) return;
@@ -186,10 +188,16 @@ Result<void> Rig::show(std::uint64_t session,
                                         projector.width,
                                         projector.height));
   }
+  const std::uint64_t darkened = [&] {
+    const std::lock_guard lock(mutex_);
+    return darkened_;
+  }();
   Shown shown = render(pattern);
   const std::lock_guard lock(mutex_);
   if (session == 0 || session != projector_session_)
     return unavailable("simulated projector: not open");
+  if (stop.stop_requested()) return cancelled("show: stopped");
+  if (darkened != darkened_) return cancelled("show: made dark meanwhile");
   if (const int count = plan_.strikes_for_good(FaultKind::kProjectorLost, pattern.id); count > 0) {
     projector_session_ = 0;
     projector_opens_to_fail_ = count - 1;

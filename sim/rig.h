@@ -50,7 +50,7 @@ class Rig : public RigPort {
                     std::stop_token stop) override;
   void close_camera(std::uint64_t session) noexcept override;
   void close_projector(std::uint64_t session) noexcept override;
-  Result<void> dark() override;
+  Result<void> dark(std::uint64_t session) override;
   Result<RigStatus> status() override;
   Result<RigTruth> truth() override;
   Result<void> arm(const Faults& faults) override;
@@ -85,6 +85,7 @@ class Rig : public RigPort {
   std::uint64_t next_session_;
   std::uint64_t camera_session_ = 0;     ///< 0: closed
   std::uint64_t projector_session_ = 0;  ///< 0: closed
+  std::uint64_t darkened_ = 0;           ///< how often
   int camera_opens_to_fail_ = 0;
   int projector_opens_to_fail_ = 0;
   std::uint64_t exposing_session_ = 0;  ///< 0: no exposure under way

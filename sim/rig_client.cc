@@ -18,7 +18,7 @@ Result<RigMessage> RigClient::ask(const char* what,
   if (stop.stop_requested()) return cancelled(fmt::format("{}: stopped", what));
   const Deadline deadline =
       std::chrono::time_point_cast<Deadline::duration>(std::chrono::steady_clock::now() + patience);
-  const auto connection = connect_unix(socket_);
+  const auto connection = connect_unix(socket_, patience, stop);
   if (!connection) return connection.error().in(where);
   request.header["do"] = what;
   if (auto sent = send_message(connection->get(), request, deadline, stop); !sent) {
@@ -82,8 +82,10 @@ void RigClient::close_projector(std::uint64_t session) noexcept {
   close("close_projector", session);
 }
 
-Result<void> RigClient::dark() {
-  const auto reply = ask("dark");
+Result<void> RigClient::dark(std::uint64_t session) {
+  RigMessage request;
+  request.header["session"] = session;
+  const auto reply = ask("dark", std::move(request));
   if (!reply) return reply.error();
   return ok();
 }

@@ -25,7 +25,7 @@ class RigClient : public RigPort {
                     std::stop_token stop) override;
   void close_camera(std::uint64_t session) noexcept override;
   void close_projector(std::uint64_t session) noexcept override;
-  Result<void> dark() override;
+  Result<void> dark(std::uint64_t session) override;
   Result<RigStatus> status() override;
   Result<RigTruth> truth() override;
   Result<void> arm(const Faults& faults) override;

@@ -50,6 +50,8 @@ struct RigTruth {
 ///          kBusy for an exposure during another.
 class RigPort {
  public:
+  static constexpr std::uint64_t kAnybody = 0;  ///< a session that nobody has, for dark()
+
   template <class Info>
   struct Opened {
     std::uint64_t session = 0;  ///< names this opening in later calls
@@ -69,8 +71,9 @@ class RigPort {
                             std::stop_token stop) = 0;
   virtual void close_camera(std::uint64_t session) noexcept = 0;
   virtual void close_projector(std::uint64_t session) noexcept = 0;  ///< leaves the lamp dark
-  /// Lamp off, for anybody: needs no session.
-  virtual Result<void> dark() = 0;
+  /// Lamp off, whoever asks. A show() under way is overtaken: it returns kCancelled and lights nothing. Unless the
+  /// projector's own session asks, that session ends, so that no pattern on its way lights the lamp again.
+  virtual Result<void> dark(std::uint64_t session) = 0;
   virtual Result<RigStatus> status() = 0;
   virtual Result<RigTruth> truth() = 0;
   /// Replaces the faults to come.

@@ -74,7 +74,7 @@ RigMessage perform(RigPort& rig, const RigMessage& request, const std::stop_toke
   if (what == "show") return show(rig, request, stop);
   if (what == "close_camera") return rig.close_camera(session_of(request)), RigMessage{};
   if (what == "close_projector") return rig.close_projector(session_of(request)), RigMessage{};
-  if (what == "dark") return reply_to(rig.dark());
+  if (what == "dark") return reply_to(rig.dark(session_of(request)));
   if (what == "status") return reply_to(rig.status());
   if (what == "truth") return reply_to(rig.truth());
   if (what == "arm") return arm(rig, request);
@@ -149,7 +149,7 @@ void RigServer::answer(int connection, std::stop_token stop) {
 RigMessage RigServer::respond(const RigMessage& request, const std::stop_token& stop) {
   if (request.header.at("do") != "end") return perform(rig_, request, stop);
   ending_ = true;
-  return reply_to(rig_.dark());
+  return reply_to(rig_.dark(RigPort::kAnybody));
 }
 
 bool RigServer::idle_for(std::chrono::nanoseconds idle) {

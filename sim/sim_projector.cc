@@ -21,16 +21,12 @@ Result<drivers::ProjectorInfo> SimProjector::info() const {
 }
 
 Result<void> SimProjector::show(const drivers::Pattern& pattern, std::stop_token stop) {
-  std::uint64_t session = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    session = session_;
-  }
-  if (session == 0) return unavailable("simulated projector: not open");
-  Result<void> shown = rig_.show(session, pattern, stop);
+  const std::uint64_t opened = session();
+  if (opened == 0) return unavailable("simulated projector: not open");
+  Result<void> shown = rig_.show(opened, pattern, stop);
   if (!shown && shown.error().code == ErrorCode::kUnavailable) {
     const std::lock_guard lock(mutex_);
-    if (session_ == session) session_ = 0;
+    if (session_ == opened) session_ = 0;
   }
   return shown;
 }

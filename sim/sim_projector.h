@@ -9,8 +9,7 @@
 namespace opaline::sim {
 
 /// The simulated station's projector: drivers::Projector over a RigPort, which outlives it. dark()
-/// works also while closed, so that a guardian need not open the device, which would take it from
-/// whoever has it. The lamp stays as it is when this process dies without close().
+/// works also while closed, and then ends the session of whoever has the device, as a guardian wants. The lamp stays as it is when this process dies without close().
 class SimProjector : public drivers::Projector {
  public:
   explicit SimProjector(RigPort& rig) : rig_(rig) {}
@@ -19,10 +18,14 @@ class SimProjector : public drivers::Projector {
   Result<void> open() override;
   Result<drivers::ProjectorInfo> info() const override;
   Result<void> show(const drivers::Pattern& pattern, std::stop_token stop) override;
-  Result<void> dark() override { return rig_.dark(); }
+  Result<void> dark() override { return rig_.dark(session()); }
   void close() noexcept override { close_session(); }
 
  private:
+  std::uint64_t session() const {
+    const std::lock_guard lock(mutex_);
+    return session_;
+  }
   void close_session() noexcept;
 
   RigPort& rig_;

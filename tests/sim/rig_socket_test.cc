@@ -230,7 +230,7 @@ TEST_F(RigSocketTest, TheLampStaysOnWhenItsDriverIsKilledUntilAnotherDarkensIt) 
   EXPECT_TRUE(WIFSIGNALED(how));
   EXPECT_TRUE(guardian.status()->lamp_on);
   EXPECT_EQ(guardian.status()->pattern_id, 5u);
-  ASSERT_TRUE(guardian.dark());
+  ASSERT_TRUE(guardian.dark(RigPort::kAnybody));
   EXPECT_FALSE(guardian.status()->lamp_on);
   // And the camera can be had at once by the next job.
   SimCamera next(guardian);

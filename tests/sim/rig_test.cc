@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <numeric>
@@ -337,6 +338,62 @@ TEST_F(RigFaultTest, AStuckLampStaysOnOnce) {
   EXPECT_TRUE(rig_->status()->lamp_on);
   ASSERT_TRUE(projector_->dark());
   EXPECT_FALSE(rig_->status()->lamp_on);
+}
+
+/// With a projector picture so large that its light takes a while to work out: dark() and stop requests come meanwhile.
+class LateShowTest : public RigTest {
+ protected:
+  void SetUp() override {
+    options_ = support::tiny_rig();
+    options_.projector.width = options_.projector.height = 2000;
+    build(options_);
+  }
+  /// Shows patterns, none seen before, each overtaken by `interrupt` a moment after; until one show is ended by it.
+  template <class Interrupt>
+  Result<void> show_overtaken(Interrupt interrupt) {
+    Result<void> shown = ok();
+    for (std::uint8_t attempt = 1; attempt <= 50 && shown; ++attempt) {
+      if (auto dark = projector_->dark(); !dark) return dark;
+      std::atomic<bool> begun = false;
+      std::stop_source stop;
+      std::jthread showing([&] {
+        const auto pattern = support::flat_pattern(options_, attempt, attempt);
+        begun = true;
+        shown = projector_->show(pattern, stop.get_token());
+      });
+      while (!begun) std::this_thread::yield();
+      std::this_thread::sleep_for(2ms);
+      interrupt(stop);
+      showing.join();
+    }
+    clock_.sleep(options_.projector.latency, {});
+    return shown;
+  }
+  bool lamp_on() { return rig_->status()->lamp_on; }
+};
+
+TEST_F(LateShowTest, DoesNotLightTheLampThatAnOutsiderMadeDark) {
+  const auto shown =
+      show_overtaken([&](std::stop_source&) { EXPECT_TRUE(rig_->dark(RigPort::kAnybody)); });
+  ASSERT_FALSE(shown);
+  EXPECT_EQ(shown.error().code, ErrorCode::kUnavailable);  // the session is over
+  EXPECT_FALSE(lamp_on());
+  EXPECT_FALSE(projector_->show(support::flat_pattern(options_, 99, 99), {}));
+}
+
+TEST_F(LateShowTest, IsOvertakenByItsOwnProjectorsDark) {
+  const auto shown = show_overtaken([&](std::stop_source&) { EXPECT_TRUE(projector_->dark()); });
+  ASSERT_FALSE(shown);
+  EXPECT_EQ(shown.error().code, ErrorCode::kCancelled);
+  EXPECT_FALSE(lamp_on());
+  EXPECT_TRUE(projector_->show(support::flat_pattern(options_, 99, 99), {}));
+}
+
+TEST_F(LateShowTest, LightsNothingOnceStopped) {
+  const auto shown = show_overtaken([](std::stop_source& stop) { stop.request_stop(); });
+  ASSERT_FALSE(shown);
+  EXPECT_EQ(shown.error().code, ErrorCode::kCancelled);
+  EXPECT_FALSE(lamp_on());
 }
 
 TEST(FaultNames, GoThereAndBack) {
