@@ -10,10 +10,13 @@
 #include <cerrno>
 #include <system_error>
 
+#include "base/clock.h"
+
 namespace opaline {
 namespace {
 
 constexpr int kBacklog = 8;
+constexpr std::chrono::milliseconds kRetryEvery{10};
 
 Error socket_error(std::string_view doing, const std::filesystem::path& path) {
   const int code = errno;
@@ -45,6 +48,20 @@ const sockaddr* generic(const sockaddr_un& address) {
   return reinterpret_cast<const sockaddr*>(&address);
 }
 
+// Removes an old socket; `name` is what to call `path` by.
+Result<void> make_room(const char* name, const std::filesystem::path& path) {
+  struct stat status {};
+  if (::lstat(name, &status) != 0) {
+    return errno == ENOENT ? ok() : Result<void>(socket_error("look at", path));
+  }
+  if (!S_ISSOCK(status.st_mode)) {
+    return invalid_argument(
+        fmt::format("{} is there already and is no socket: move it away, or choose another path",
+                    path.string()));
+  }
+  return ::unlink(name) == 0 ? ok() : Result<void>(socket_error("remove", path));
+}
+
 }  // namespace
 
 Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
@@ -53,7 +70,7 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
   FileDescriptor fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!fd) return socket_error("create", path);
   const char* name = static_cast<const char*>(target->address.sun_path);
-  ::unlink(name);
+  if (auto free = make_room(name, path); !free) return free.error();
   if (::bind(fd.get(), generic(target->address), sizeof(sockaddr_un)) != 0) {
     return socket_error("bind", path);
   }
@@ -64,14 +81,24 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
   return fd;
 }
 
-Result<FileDescriptor> connect_unix(const std::filesystem::path& path) {
+Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
+                                    std::chrono::nanoseconds patience,
+                                    std::stop_token stop) {
   const Result<ShortAddress> target = short_address(path);
   if (!target) return target.error();
-  FileDescriptor fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  FileDescriptor fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!fd) return socket_error("create", path);
-  if (::connect(fd.get(), generic(target->address), sizeof(sockaddr_un)) != 0) {
-    return socket_error("connect to", path);
+  SystemClock clock;
+  const std::chrono::nanoseconds deadline = clock.now() + patience;
+  while (::connect(fd.get(), generic(target->address), sizeof(sockaddr_un)) != 0) {
+    if (errno != EAGAIN) return socket_error("connect to", path);  // EAGAIN: the backlog is full
+    if (clock.now() >= deadline) {
+      return timeout(fmt::format("{} takes no connection: whoever serves it is stopped or hangs",
+                                 path.string()));
+    }
+    if (!clock.sleep(kRetryEvery, stop)) return cancelled("while connecting to " + path.string());
   }
+  if (::fcntl(fd.get(), F_SETFL, 0) != 0) return socket_error("connect to", path);
   return fd;
 }
 

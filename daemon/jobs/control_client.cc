@@ -62,7 +62,7 @@ Result<nlohmann::json> ask_job(const std::filesystem::path& socket,
                                const nlohmann::json& request,
                                std::chrono::milliseconds deadline) {
   const auto until = SteadyClock::now() + deadline;
-  const Result<FileDescriptor> fd = connect_unix(socket);
+  const Result<FileDescriptor> fd = connect_unix(socket, deadline);
   if (!fd) return fd.error();
   const std::string line = request.dump() + "\n";
   if (::send(fd->get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT) !=
