@@ -32,6 +32,13 @@ std::size_t first_unfinished(const SessionHistory& history) {
   return static_cast<std::size_t>(it - stages.begin());
 }
 
+// Every other fact is work done that the next run need not do again.
+bool is_fruit(std::string_view type) {
+  constexpr std::array<std::string_view, 3> kNone{
+      "capture.planned", "region.damaged", "region.retaken"};
+  return std::ranges::find(kNone, type) == kNone.end();
+}
+
 Decision decide_next(const SessionHistory& history) {
   const std::size_t next = first_unfinished(history);
   if (next == kStages.size()) return {SessionState::kSucceeded, Action::kNone, next - 1};
@@ -99,7 +106,7 @@ void SessionHistory::apply(const Event& event) {
     cancelled_ = true;
   } else if (event.type == "session.resumed") {
     on_resumed();
-  } else {
+  } else if (is_fruit(event.type)) {
     for (Stage& any : stages_) any.fruitless = 0;
   }
 }
@@ -120,6 +127,7 @@ void SessionHistory::on_finished(Stage& stage, const Event& event) {
   stage.code = text_of(event.data, "code");
   stage.finished = event.time;
   if (stage.state == StageState::kBusy) stage.fruitless = 0;
+  if (stage.state == StageState::kInterrupted && stage.fruitless > 0) --stage.fruitless;
   if (stage.state == StageState::kSucceeded) stage.fruitless = 0;
 }
 

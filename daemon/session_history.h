@@ -39,7 +39,8 @@ struct Stage {
 /// job.started, job.finished and job.cancel_requested (daemon/jobs/job.h), and the supervisor's own
 ///   session.cancelled  no stage is to be started any more
 ///   session.resumed    what failed or was cancelled may be tried again
-/// Any other fact counts as work done; progress does not.
+/// Any other fact counts as work done; progress, plans and what has to be taken again do not. A run
+/// that a signal ended (somebody wanted the machine) says nothing about the stage.
 class SessionHistory {  // NOLINT(bugprone-exception-escape): a null JSON value throws nothing
  public:
   void apply(const Event& event);

@@ -77,6 +77,31 @@ TEST(SessionHistory, GoesOnForEverWhileEachRunGetsSomewhere) {
   EXPECT_EQ(history.dead().action, Action::kStart);
 }
 
+TEST(SessionHistory, CountsAPlanThatEachRunLogsAsNoWorkDone) {
+  History history;
+  for (int i = 0; i < 3; ++i) history.started("capture").add("capture.planned");
+
+  EXPECT_EQ(history.dead().action, Action::kGiveUp);
+}
+
+TEST(SessionHistory, CountsARunThatASignalEndedNeitherWay) {
+  History history;
+  for (int i = 0; i < 5; ++i) {
+    history.started("capture").finished("capture", "cancelled", {{"by", "signal"}});
+  }
+  EXPECT_EQ(history.dead().action, Action::kStart);
+  history.started("capture").started("capture").started("capture");
+  EXPECT_EQ(history.dead().action, Action::kGiveUp);
+}
+
+TEST(SessionHistory, CountsACheckpointAsWorkDone) {
+  History history;
+  history.done("capture");
+  for (int i = 0; i < 9; ++i) history.started("reconstruct").add("checkpoint.saved");
+
+  EXPECT_EQ(history.dead().action, Action::kStart);
+}
+
 TEST(SessionHistory, EndsWithAStageThatFailed) {
   History history;
   history.started("capture").finished("capture", "failed", {{"message", "too dark"}});
