@@ -31,6 +31,11 @@ struct CameraModel {
   };
   /// Where a point of the sample's frame (mm) is seen; the point must lie in front of the camera.
   Pixel project(Vec3 point_in_sample) const;
+  /// Whether the camera looks towards a point: Z > 0, which a camera turned away would project too,
+  /// but upside down.
+  bool faces(Vec3 point_in_sample) const {
+    return camera_from_sample.apply(point_in_sample).z > 0.0;
+  }
   /// The direction, in the sample's frame, of the ray through a pixel; undoes the distortion by
   /// iteration.
   Vec3 ray_direction(Pixel pixel) const;

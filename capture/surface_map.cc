@@ -66,6 +66,20 @@ Span pixels_between(double low, double high, int size) {
           static_cast<int>(std::clamp(std::ceil(high), 0.0, limit))};
 }
 
+// The face is flat, so that its corners tell for all of it.
+Result<void> check_direction(const Block& block, Face face, const CameraModel& camera) {
+  const double width = block.face_width(face);
+  const double height = block.face_height(face);
+  for (const auto& [u, v] : {std::pair{0.0, 0.0}, {width, 0.0}, {width, height}, {0.0, height}}) {
+    if (camera.faces(face_point(block, face, u, v))) continue;
+    return invalid_argument(fmt::format(
+        "the camera looks away from face {}: expected a pose in which its +Z axis points at the "
+        "sample (camera_from_sample, as OpenCV has it)",
+        std::string(to_string(face))));
+  }
+  return ok();
+}
+
 }  // namespace
 
 void SurfaceMap::add_cell(const Polygon& corners, const CameraModel& camera) {
@@ -100,6 +114,7 @@ void SurfaceMap::drop_partial_pixels(const CameraModel& camera) {
 }
 
 Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const CameraModel& camera) {
+  if (auto direction = check_direction(block, face, camera); !direction) return direction.error();
   SurfaceMap map(block.face_width(face), block.face_height(face));
   map.view_cosine_ = Image<float>(map.width_, map.height_, 1);
   const Vec3 normal = outward_normal(face);

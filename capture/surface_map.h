@@ -24,7 +24,8 @@ struct SurfaceRadiance {
 /// that reach over the face's edge see something else as well and are left out.
 class SurfaceMap {
  public:
-  /// Errors: kInvalidArgument when the camera is behind the face or sees none of it.
+  /// Errors: kInvalidArgument when the camera is behind the face, is turned away from it, or sees
+  /// none of it.
   static Result<SurfaceMap> create(const Block& block, Face face, const CameraModel& camera);
   /// A cell needs `min_coverage` of its area on usable pixels.
   SurfaceRadiance apply(const HdrImage& hdr, double min_coverage) const;

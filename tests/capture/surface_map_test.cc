@@ -145,6 +145,22 @@ TEST(SurfaceMap, SeesEveryFaceFromItsOutside) {
   }
 }
 
+// Turned by half a turn about its own vertical, the face lies behind it, where Z < 0 mirrors it into
+// the picture.
+TEST(SurfaceMap, RefusesACameraThatLooksAway) {
+  CameraModel model = camera(10.0, 0.0);
+  for (const int row : {0, 2}) {
+    for (int i = 0; i < 3; ++i) model.camera_from_sample.rotation[3 * row + i] *= -1.0;
+  }
+  model.camera_from_sample.translation.x *= -1.0;
+  model.camera_from_sample.translation.z *= -1.0;
+  EXPECT_LT(length(model.centre() - camera(10.0, 0.0).centre()), 1e-9);
+  const auto map = SurfaceMap::create(kBlock, Face::kZMax, model);
+  ASSERT_FALSE(map);
+  EXPECT_EQ(map.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(map.error().message, HasSubstr("looks away"));
+}
+
 TEST(SurfaceMap, SaysWhenTheCameraLooksPast) {
   CameraModel model = camera(0.0, 0.0);
   model.cx = 5000.0;
