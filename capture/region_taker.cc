@@ -83,7 +83,12 @@ Result<std::unique_ptr<RegionTaker>> RegionTaker::create(const Station& station,
                                                          EventSink& events) {
   std::unique_ptr<RegionTaker> taker(new RegionTaker(station, settings, events));
   if (auto opened = taker->open_devices(); !opened) return opened.error();
-  if (auto planned = taker->plan(); !planned) return planned.error();
+  auto ladder = exposure_ladder(settings.options.exposures,
+                                {taker->projector_.frame_period,
+                                 taker->camera_.shortest_exposure,
+                                 taker->camera_.longest_exposure});
+  if (!ladder) return ladder.error();
+  taker->ladder_ = *std::move(ladder);
   return taker;
 }
 
@@ -97,10 +102,11 @@ Result<void> RegionTaker::open_devices() {
   projector_ = *std::move(projector);
   camera_ = *std::move(camera);
   check_.emplace(camera_);
-  return ok();
+  return check_sizes();
 }
 
-Result<void> RegionTaker::plan() {
+// What is plugged in again may be something else.
+Result<void> RegionTaker::check_sizes() const {
   const CameraModel& model = settings_.camera.model;
   if (camera_.width != model.width || camera_.height != model.height ||
       camera_.bit_depth != settings_.camera.bit_depth) {
@@ -113,11 +119,6 @@ Result<void> RegionTaker::plan() {
                     model.height,
                     settings_.camera.bit_depth));
   }
-  auto ladder = exposure_ladder(
-      settings_.options.exposures,
-      {projector_.frame_period, camera_.shortest_exposure, camera_.longest_exposure});
-  if (!ladder) return ladder.error();
-  ladder_ = *std::move(ladder);
   return ok();
 }
 
@@ -132,7 +133,8 @@ Result<void> RegionTaker::recover(std::stop_token stop) {
     station_.projector.close();
     if (!station_.clock.sleep(kReplugPause, stop)) return cancelled("while devices were away");
     auto opened = open_devices();
-    if (opened || station_.clock.now() >= deadline) return opened;
+    const bool other = !opened && opened.error().code == ErrorCode::kInvalidArgument;
+    if (opened || other || station_.clock.now() >= deadline) return opened;
   }
 }
 
@@ -164,7 +166,10 @@ Result<TakenLight> RegionTaker::with_retries(const std::string& name,
                                      {"message", failure.error.message}});
     if (!noted) return noted.error();
     if (failure.fault != "device") continue;
-    if (auto back = recover(stop); !back) log::warning("{}: {}", name, back.error().message);
+    if (auto back = recover(stop); !back) {
+      if (back.error().code == ErrorCode::kInvalidArgument) return back.error().in(name);
+      log::warning("{}: {}", name, back.error().message);
+    }
   }
 }
 

@@ -55,7 +55,8 @@ struct TakenLight {
 /// Takes one light after another: shows it, lets it settle, exposes, checks every frame. A light
 /// with a bad frame is taken again from its first exposure, up to the retries allowed; each time is
 /// a fact, "region.retaken" {region, attempt, fault, message}. Devices that were lost are closed
-/// and opened again between the tries, until they are back or ten seconds are over.
+/// and opened again between the tries, until they are back or ten seconds are over; a camera that
+/// is not the calibrated one ends it with kInvalidArgument.
 ///
 /// Threads: one caller at a time. Waits as the devices do. Errors: kUnavailable or kTimeout, naming
 /// light and exposure, when the retries are used up; kCancelled; kInvalidArgument.
@@ -102,7 +103,7 @@ class RegionTaker {
 
   RegionTaker(const Station& station, const Settings& settings, EventSink& events);
   Result<void> open_devices();
-  Result<void> plan();
+  Result<void> check_sizes() const;
   Result<void> recover(std::stop_token stop);
   Result<TakenLight> with_retries(const std::string& name,
                                   const AttemptFunction& attempt,

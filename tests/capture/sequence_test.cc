@@ -379,6 +379,52 @@ TEST_F(SequenceTest, RefusesACameraThatIsNotTheCalibratedOne) {
   EXPECT_THAT(summary.error().message, HasSubstr("64 x 64"));
 }
 
+/// Is unplugged in its tenth exposure; what is plugged in then has half the pixels.
+class SwappedCamera : public drivers::Camera {
+ public:
+  explicit SwappedCamera(drivers::Camera& camera) : camera_(camera) {}
+  Result<void> open() override {
+    ++opens_;
+    return camera_.open();
+  }
+  Result<drivers::CameraInfo> info() const override {
+    auto info = camera_.info();
+    if (info && opens_ > 1) info->width /= 2;
+    return info;
+  }
+  Result<Frame> capture(const drivers::ExposureRequest& request, std::stop_token stop) override {
+    if (++exposures_ == 10) return unavailable("unplugged");
+    auto frame = camera_.capture(request, std::move(stop));
+    if (!frame || opens_ == 1) return frame;
+    frame->pixels = Image<std::uint16_t>(frame->pixels.width() / 2,
+                                         frame->pixels.height(),
+                                         3,
+                                         static_cast<std::uint16_t>(exposures_));
+    frame->sha256 = frame_hash(frame->pixels);
+    return frame;
+  }
+  void close() noexcept override { camera_.close(); }
+
+ private:
+  drivers::Camera& camera_;
+  int opens_ = 0;
+  int exposures_ = 0;
+};
+
+TEST_F(SequenceTest, RefusesAnotherCameraPluggedInOnTheWay) {
+  support::TinyStation tiny(options_);
+  const Station station = tiny.station();
+  SwappedCamera camera(station.camera);
+  NullSink events;
+  const auto summary = capture_session(task_,
+                                       {camera, station.projector, station.clock},
+                                       {dir_.path(), support::unsynced_files(), events},
+                                       {});
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(summary.error().message, HasSubstr("32 x 64"));
+}
+
 TEST_F(SequenceTest, TellsHowFarItIs) {
   ASSERT_TRUE(run(dir_.path()));
   const auto all = events_->progresses();
