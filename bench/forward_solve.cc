@@ -1,17 +1,19 @@
 // How long do 16 illuminations of one medium take to a float64 residual of 1e-6, set-up included, and how does that
-// compare with Eigen's conjugate gradients in the same run?
-//
-//   forward_solve [--case NAME] [--rounds N] [--no-eigen]
-//
-// prints one JSON object a figure (bench/figure.h).
+// compare, in the same run, with hypre's multigrid, Eigen's conjugate gradients and the paper's hierarchical relaxation?
+// Prints one JSON object a figure (bench/figure.h).
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
-#include <string_view>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -27,31 +29,16 @@ using reconstruct::diffusion::FluenceSolver;
 using reconstruct::diffusion::SolveSummary;
 
 constexpr double kTolerance = 1e-6;
+constexpr double kFrontFaceError =
+    1e-4;  // at which relaxation is compared: single precision reaches it
 
 struct Arguments {
-  std::string_view only;  ///< a case's name, or all of them
+  std::vector<std::string> cases{"a64", "wax1", "marble"};
   int rounds = 5;
   bool eigen = true;
+  bool hypre = true;
+  bool relaxation = true;
 };
-
-std::optional<Arguments> parse(int count, char** words) {
-  Arguments arguments;
-  for (int n = 1; n < count; ++n) {
-    const std::string_view word = words[n];
-    if (word == "--no-eigen") {
-      arguments.eigen = false;
-    } else if (word == "--case" && n + 1 < count) {
-      arguments.only = words[++n];
-    } else if (word == "--rounds" && n + 1 < count) {
-      const std::string_view number = words[++n];
-      std::from_chars(number.data(), number.data() + number.size(), arguments.rounds);
-      if (arguments.rounds < 1) return std::nullopt;
-    } else {
-      return std::nullopt;
-    }
-  }
-  return arguments;
-}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -90,53 +77,148 @@ double bytes_counted(const ForwardCase& problem, int iterations) {
          (iterations * (cycle + 6.0 + 3.0) + kReplacements * (2.0 + 2.0 + 2.0 + 2.0 + 2.0 + 1.0));
 }
 
-int run_case(const ForwardCase& problem, const Arguments& arguments, double triad) {
+/// What the program has held at most, MB.
+double peak_megabytes() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+struct Timed {
+  double seconds = 0.0;
+  double setup = 0.0;
+  int iterations = 0;
+  FieldBatch x;
+};
+
+/// Medians of the rounds.
+Result<Timed> time_host(const ForwardCase& problem, double tolerance, int rounds) {
   const auto solver = reconstruct::host::make_host_solver({});
   std::vector<double> seconds;
   std::vector<double> setup;
-  FieldBatch x(problem.b.cells, problem.b.count);
-  int iterations = 0;
-  for (int round = 0; round < arguments.rounds + 1; ++round) {
-    std::fill(x.values.begin(), x.values.end(), 0.0);
+  Timed timed{0.0, 0.0, 0, FieldBatch(problem.b.cells, problem.b.count)};
+  for (int round = 0; round < rounds + 1; ++round) {
+    std::fill(timed.x.values.begin(), timed.x.values.end(), 0.0);
     const auto start = std::chrono::steady_clock::now();
-    if (!solver->prepare(problem.medium)) return 1;
+    if (auto prepared = solver->prepare(problem.medium); !prepared) return prepared.error();
     const double prepared = seconds_since(start);
-    const Result<SolveSummary> solved = solver->solve(problem.b, x, {kTolerance, 100}, {});
-    if (!solved) return 1;
-    iterations = solved->iterations;
+    const Result<SolveSummary> solved = solver->solve(problem.b, timed.x, {tolerance, 100}, {});
+    if (!solved) return solved.error();
+    timed.iterations = solved->iterations;
     if (round == 0) continue;  // the first one asks the system for memory
     seconds.push_back(seconds_since(start));
     setup.push_back(prepared);
   }
-  const double total = median(seconds);
-  print_figure("forward.seconds", problem.name, total, "s");
-  print_figure("forward.setup_seconds", problem.name, median(setup), "s");
-  print_figure("forward.iterations", problem.name, iterations, "1");
-  print_figure("forward.relative_residual", problem.name, relative_residual(problem, x), "1");
-  const double bytes = bytes_counted(problem, iterations);
-  print_figure("forward.bytes", problem.name, bytes, "B");
-  print_figure("forward.bandwidth_fraction", problem.name, bytes / total / triad, "1");
-  if (!arguments.eigen) return 0;
-  const int rounds = problem.b.cells > 1000000 ? 1 : std::min(3, arguments.rounds);
-  const EigenRun eigen = run_eigen_cg(problem, kTolerance, rounds);
+  timed.seconds = median(seconds);
+  timed.setup = median(setup);
+  return timed;
+}
+
+struct Close {
+  void operator()(FILE* pipe) const { ::pclose(pipe); }
+};
+
+/// hypre_pfmg's answer, one process a core; nothing where it was not built or does not run.
+std::optional<nlohmann::json> run_hypre(const ForwardCase& problem, int rounds) {
+  const auto program =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "bench_hypre_pfmg";
+  if (!std::filesystem::exists(program)) return std::nullopt;
+  // hypre's own residual is that of its recurrence: a little stricter makes the true one 1e-6 as well.
+  const std::string command = fmt::format(
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMP_NUM_THREADS=1 "
+      "mpirun --oversubscribe -np {} '{}' {} {} {}",
+      std::max(1U, std::thread::hardware_concurrency()),
+      program.string(),
+      problem.name,
+      rounds,
+      0.9 * kTolerance);
+  const std::unique_ptr<FILE, Close> pipe(::popen(command.c_str(), "r"));
+  if (!pipe) return std::nullopt;
+  std::string text;
+  for (int c = std::fgetc(pipe.get()); c != EOF; c = std::fgetc(pipe.get()))
+    text.push_back(static_cast<char>(c));
+  auto answer = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (answer.is_discarded() || !answer.contains("seconds")) return std::nullopt;
+  return answer;
+}
+
+void compare_with_hypre(const ForwardCase& problem, const Timed& ours, int rounds) {
+  const auto hypre = run_hypre(problem, rounds);
+  if (!hypre) {
+    fmt::print(stderr, "{}: no hypre (libhypre-dev, openmpi-bin), no comparison\n", problem.name);
+    return;
+  }
+  const double seconds = hypre->value("seconds", 0.0);
+  print_figure("forward.hypre_seconds", problem.name, seconds, "s");
+  print_figure("forward.hypre_iterations", problem.name, hypre->value("iterations", 0), "1");
+  print_figure(
+      "forward.hypre_relative_residual", problem.name, hypre->value("relative_residual", 1.0), "1");
+  print_figure("forward.ratio_vs_hypre", problem.name, seconds / ours.seconds, "x");
+}
+
+void compare_with_eigen(const ForwardCase& problem, const Timed& ours, int rounds) {
+  const EigenRun eigen =
+      run_eigen_cg(problem, kTolerance, problem.b.cells > 1000000 ? 1 : std::min(3, rounds));
   print_figure("forward.eigen_cg_seconds", problem.name, eigen.seconds, "s");
   print_figure("forward.eigen_cg_relative_residual", problem.name, eigen.relative_residual, "1");
-  print_figure("forward.ratio_vs_eigen_cg", problem.name, eigen.seconds / total, "1");
-  return 0;
+  print_figure("forward.ratio_vs_eigen_cg", problem.name, eigen.seconds / ours.seconds, "x");
+}
+
+/// Both to the same front-face error.
+Result<void> compare_with_relaxation(const ForwardCase& problem, int rounds) {
+  const auto exact = time_host(problem, 1e-10, 1);
+  if (!exact) return exact.error();
+  for (double tolerance = 1e-2; tolerance > 1e-9; tolerance *= 0.5) {
+    const auto ours = time_host(problem, tolerance, rounds);
+    if (!ours) return ours.error();
+    const double error = front_face_error(problem, ours->x, exact->x);
+    if (error > kFrontFaceError) continue;
+    const RelaxationRun relaxed = run_relaxation(problem, exact->x, kFrontFaceError);
+    print_figure("forward.front_face_error", problem.name, error, "1");
+    print_figure("forward.seconds_to_front_face_error", problem.name, ours->seconds, "s");
+    print_figure("forward.relaxation_front_face_error", problem.name, relaxed.error, "1");
+    print_figure("forward.relaxation_sweeps", problem.name, relaxed.sweeps, "1");
+    print_figure("forward.relaxation_seconds", problem.name, relaxed.seconds, "s");
+    print_figure("forward.ratio_vs_relaxation", problem.name, relaxed.seconds / ours->seconds, "x");
+    return ok();
+  }
+  return internal_error("the front-face error stays above what is compared at");
+}
+
+Result<void> run_case(const ForwardCase& problem, const Arguments& arguments, double triad) {
+  const auto ours = time_host(problem, kTolerance, arguments.rounds);
+  if (!ours) return ours.error();
+  print_figure("forward.seconds", problem.name, ours->seconds, "s");
+  print_figure("forward.nanoseconds_per_cell",
+               problem.name,
+               1e9 * ours->seconds / static_cast<double>(problem.b.values.size()),
+               "ns");
+  print_figure("forward.setup_seconds", problem.name, ours->setup, "s");
+  print_figure("forward.iterations", problem.name, ours->iterations, "1");
+  print_figure("forward.peak_mb", problem.name, peak_megabytes(), "MB");
+  print_figure("forward.relative_residual", problem.name, relative_residual(problem, ours->x), "1");
+  const double bytes = bytes_counted(problem, ours->iterations);
+  print_figure("forward.bytes", problem.name, bytes, "B");
+  print_figure("forward.bandwidth_fraction", problem.name, bytes / ours->seconds / triad, "1");
+  if (arguments.hypre) compare_with_hypre(problem, *ours, arguments.rounds);
+  if (arguments.eigen) compare_with_eigen(problem, *ours, arguments.rounds);
+  if (arguments.relaxation) return compare_with_relaxation(problem, arguments.rounds);
+  return ok();
 }
 
 int run(const Arguments& arguments) {
-  struct Size {
-    const char* name;
-    int nx, ny, nz;
-  };
   const double triad = triad_bytes_per_second();
   print_figure("machine.triad_bandwidth", "all", triad, "B/s");
-  for (const Size& size :
-       {Size{"a64", 64, 64, 32}, Size{"wax1", 130, 53, 37}, Size{"marble", 256, 256, 20}}) {
-    if (!arguments.only.empty() && arguments.only != size.name) continue;
-    const ForwardCase problem = make_forward_case(size.name, size.nx, size.ny, size.nz);
-    if (const int failed = run_case(problem, arguments, triad); failed != 0) return failed;
+  for (const std::string& name : arguments.cases) {
+    const auto problem = make_forward_case(name);
+    if (!problem) {
+      fmt::print(stderr, "no case '{}'; there are a64, wax1, marble, cube64, cube256\n", name);
+      return 2;
+    }
+    if (auto done = run_case(*problem, arguments, triad); !done) {
+      fmt::print(stderr, "{}: {}\n", name, done.error().message);
+      return 1;
+    }
   }
   return 0;
 }
@@ -145,10 +227,17 @@ int run(const Arguments& arguments) {
 }  // namespace opaline::bench
 
 int main(int argc, char** argv) {
-  const auto arguments = opaline::bench::parse(argc, argv);
-  if (!arguments) {
-    fmt::print(stderr, "usage: forward_solve [--case a64|wax1|marble] [--rounds N] [--no-eigen]\n");
-    return 2;
-  }
-  return opaline::bench::run(*arguments);
+  CLI::App app(
+      "Times 16 illuminations of one medium to a float64 residual of 1e-6 and compares with "
+      "peers.\n"
+      "Example: forward_solve --case cube64 --case cube256 --no-eigen --no-relaxation");
+  opaline::bench::Arguments arguments;
+  app.add_option("--case", arguments.cases, "a64, wax1, marble, cube64, cube256")->take_all();
+  app.add_option("--rounds", arguments.rounds, "Of which the median is taken")
+      ->check(CLI::Range(1, 1000));
+  app.add_flag("!--no-eigen", arguments.eigen, "Leave Eigen's conjugate gradients out");
+  app.add_flag("!--no-hypre", arguments.hypre, "Leave hypre's multigrid out");
+  app.add_flag("!--no-relaxation", arguments.relaxation, "Leave hierarchical relaxation out");
+  CLI11_PARSE(app, argc, argv);
+  return opaline::bench::run(arguments);
 }

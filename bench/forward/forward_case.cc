@@ -52,4 +52,36 @@ ForwardCase make_forward_case(const std::string& name, int nx, int ny, int nz) {
   return made;
 }
 
+std::optional<ForwardCase> make_forward_case(const std::string& name) {
+  struct Size {
+    const char* name;
+    int nx, ny, nz;
+  };
+  for (const Size& size : {Size{"a64", 64, 64, 32},
+                           Size{"wax1", 130, 53, 37},
+                           Size{"marble", 256, 256, 20},
+                           Size{"cube64", 64, 64, 64},
+                           Size{"cube256", 256, 256, 256}}) {
+    if (name == size.name) return make_forward_case(name, size.nx, size.ny, size.nz);
+  }
+  return std::nullopt;
+}
+
+double front_face_error(const ForwardCase& problem,
+                        const reconstruct::diffusion::FieldBatch& x,
+                        const reconstruct::diffusion::FieldBatch& exact) {
+  const Block& block = problem.medium.block;
+  double worst = 0.0;
+  for (int m = 0; m < x.count; ++m) {
+    double off = 0.0;
+    double all = 0.0;
+    for (std::size_t c = block.index(0, 0, block.nz - 1); c < block.cell_count(); ++c) {
+      off += std::pow(x.field(m)[c] - exact.field(m)[c], 2);
+      all += std::pow(exact.field(m)[c], 2);
+    }
+    worst = std::max(worst, std::sqrt(off / all));
+  }
+  return worst;
+}
+
 }  // namespace opaline::bench

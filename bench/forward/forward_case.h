@@ -1,6 +1,8 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "reconstruct/diffusion/fluence_solver.h"
 
@@ -16,6 +18,9 @@ struct ForwardCase {
 /// Cells of 0.5 mm; kappa from 0.1 to 1 mm and sigma_a from 0.001 to 0.1 per mm, both smooth and random (the sum of 24
 /// plane waves of 8 mm and longer, mapped to the whole range in logarithms); Robin on all six sides, A at eta = 1.3.
 ForwardCase make_forward_case(const std::string& name, int nx, int ny, int nz);
+/// One of the cases that are measured: a64 (64 x 64 x 32), wax1 (130 x 53 x 37), marble (256 x 256 x 20), cube64 and
+/// cube256 (64 and 256 cells a side); nothing for another name.
+std::optional<ForwardCase> make_forward_case(const std::string& name);
 
 /// ||b - K x|| / ||b|| of the worst right-hand side in float64, with the matrix written down here, apart from the solvers.
 double relative_residual(const ForwardCase& problem, const reconstruct::diffusion::FieldBatch& x);
@@ -27,5 +32,23 @@ struct EigenRun {
   double relative_residual = 0.0;
 };
 EigenRun run_eigen_cg(const ForwardCase& problem, double tolerance, int rounds);
+
+/// Relative L2 of the fluence in the cells behind the face z_max, the worst right-hand side's: what a camera sees.
+double front_face_error(const ForwardCase& problem,
+                        const reconstruct::diffusion::FieldBatch& x,
+                        const reconstruct::diffusion::FieldBatch& exact);
+
+/// Hierarchical relaxation as Wang 2008, section 5.3, has it: Jacobi sweeps from the coarsest grid to the finest, each
+/// level starting from the one before. All right-hand sides in one sweep, single precision, every core, the
+/// instruction set of the processor. Sweeps of the finest level go on until the front-face error is `error`, looked at
+/// every 20 sweeps with the clock stopped.
+struct RelaxationRun {
+  double seconds = 0.0;
+  int sweeps = 0;      ///< of the finest level
+  double error = 0.0;  ///< reached
+};
+RelaxationRun run_relaxation(const ForwardCase& problem,
+                             const reconstruct::diffusion::FieldBatch& exact,
+                             double error);
 
 }  // namespace opaline::bench

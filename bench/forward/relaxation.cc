@@ -1,0 +1,196 @@
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "bench/forward/forward_case.h"
+
+namespace opaline::bench {
+namespace {
+
+using reconstruct::diffusion::FieldBatch;
+using reconstruct::diffusion::Medium;
+
+constexpr int kLanes = 16;  // right-hand sides side by side
+constexpr int kLook = 20;   // sweeps between two looks at the error
+constexpr int kCoarseSweeps = 400;
+constexpr int kMostSweeps = 200000;
+
+/// One grid: face conductances towards the higher index, 1 / diagonal, light and fluence.
+struct Grid {
+  Medium medium;
+  std::vector<float> gx, gy, gz, inverse;
+  std::vector<float> b, u, next;  // cell by cell, kLanes each
+};
+
+/// Half as many cells along every axis that has two and more, each with the mean of those it covers.
+Medium coarsened(const Medium& fine) {
+  const Block& f = fine.block;
+  const auto half = [](int n) { return std::max(1, n / 2); };
+  const Block c{half(f.nx),
+                half(f.ny),
+                half(f.nz),
+                f.size().x / half(f.nx),
+                f.size().y / half(f.ny),
+                f.size().z / half(f.nz)};
+  Medium coarse{c,
+                std::vector<double>(c.cell_count(), 0.0),
+                std::vector<double>(c.cell_count(), 0.0),
+                fine.boundary_a};
+  std::vector<int> covered(c.cell_count(), 0);
+  for (int k = 0; k < f.nz; ++k)
+    for (int j = 0; j < f.ny; ++j)
+      for (int i = 0; i < f.nx; ++i) {
+        const std::size_t to = c.index(i * c.nx / f.nx, j * c.ny / f.ny, k * c.nz / f.nz);
+        coarse.diffusion[to] += fine.diffusion[f.index(i, j, k)];
+        coarse.absorption[to] += fine.absorption[f.index(i, j, k)];
+        ++covered[to];
+      }
+  for (std::size_t n = 0; n < covered.size(); ++n) {
+    coarse.diffusion[n] /= covered[n];
+    coarse.absorption[n] /= covered[n];
+  }
+  return coarse;
+}
+
+/// `values` of the fine grid's cells, summed where a coarse cell covers them.
+std::vector<float> gathered(const Block& f, const Block& c, const std::vector<float>& values) {
+  std::vector<float> sums(c.cell_count() * kLanes, 0.0F);
+  for (int k = 0; k < f.nz; ++k)
+    for (int j = 0; j < f.ny; ++j)
+      for (int i = 0; i < f.nx; ++i) {
+        const std::size_t from = f.index(i, j, k) * kLanes;
+        const std::size_t to = c.index(i * c.nx / f.nx, j * c.ny / f.ny, k * c.nz / f.nz) * kLanes;
+        for (int m = 0; m < kLanes; ++m) sums[to + m] += values[from + m];
+      }
+  return sums;
+}
+
+void scatter(const Grid& coarse, Grid& fine) {
+  const Block& f = fine.medium.block;
+  const Block& c = coarse.medium.block;
+  for (int k = 0; k < f.nz; ++k)
+    for (int j = 0; j < f.ny; ++j)
+      for (int i = 0; i < f.nx; ++i)
+        std::copy_n(coarse.u.begin() +
+                        static_cast<std::ptrdiff_t>(
+                            c.index(i * c.nx / f.nx, j * c.ny / f.ny, k * c.nz / f.nz) * kLanes),
+                    kLanes,
+                    fine.u.begin() + static_cast<std::ptrdiff_t>(f.index(i, j, k) * kLanes));
+}
+
+Grid make_grid(Medium medium, std::vector<float> light) {
+  Grid grid{std::move(medium), {}, {}, {}, {}, std::move(light), {}, {}};
+  const Block& block = grid.medium.block;
+  const auto& kappa = grid.medium.diffusion;
+  const std::size_t n = block.cell_count();
+  for (auto* g : {&grid.gx, &grid.gy, &grid.gz, &grid.inverse}) g->assign(n, 0.0F);
+  grid.u.assign(n * kLanes, 0.0F);
+  grid.next.assign(n * kLanes, 0.0F);
+  std::vector<double> diagonal(n);
+  for (std::size_t c = 0; c < n; ++c) diagonal[c] = block.cell_volume() * grid.medium.absorption[c];
+  const std::array<std::vector<float>*, 3> conductances{&grid.gx, &grid.gy, &grid.gz};
+  const std::array<std::size_t, 3> stride{
+      1, static_cast<std::size_t>(block.nx), static_cast<std::size_t>(block.nx) * block.ny};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double h = block.spacing()[axis];
+    const double area = block.cell_volume() / h;
+    const auto count = static_cast<std::size_t>(block.cells()[axis]);
+    for (std::size_t c = 0; c < n; ++c) {
+      const std::size_t at = c / stride[axis] % count;
+      const double wall = area / (2.0 * grid.medium.boundary_a + h / (2.0 * kappa[c]));
+      if (at == 0) diagonal[c] += wall;
+      if (at + 1 == count) {
+        diagonal[c] += wall;
+        continue;
+      }
+      const std::size_t other = c + stride[axis];
+      const double g = area / h * 2.0 * kappa[c] * kappa[other] / (kappa[c] + kappa[other]);
+      (*conductances[axis])[c] = static_cast<float>(g);
+      diagonal[c] += g;
+      diagonal[other] += g;
+    }
+  }
+  for (std::size_t c = 0; c < n; ++c) grid.inverse[c] = static_cast<float>(1.0 / diagonal[c]);
+  return grid;
+}
+
+/// next = (b + sum g u) / D along one row of cells.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void relax_row(Grid& grid,
+                                                                            int j,
+                                                                            int k) {
+  const Block& block = grid.medium.block;
+  const auto nx = static_cast<std::size_t>(block.nx);
+  const std::size_t plane = nx * static_cast<std::size_t>(block.ny);
+  const std::size_t row = block.index(0, j, k);
+  for (std::size_t c = row; c < row + nx; ++c) {
+    float sum[kLanes];
+    const float* b = grid.b.data() + c * kLanes;
+    for (int m = 0; m < kLanes; ++m) sum[m] = b[m];
+    const auto add = [&](float g, std::size_t from) {
+      const float* u = grid.u.data() + from * kLanes;
+      for (int m = 0; m < kLanes; ++m) sum[m] += g * u[m];
+    };
+    if (c > row) add(grid.gx[c - 1], c - 1);
+    if (c + 1 < row + nx) add(grid.gx[c], c + 1);
+    if (j > 0) add(grid.gy[c - nx], c - nx);
+    if (j + 1 < block.ny) add(grid.gy[c], c + nx);
+    if (k > 0) add(grid.gz[c - plane], c - plane);
+    if (k + 1 < block.nz) add(grid.gz[c], c + plane);
+    float* next = grid.next.data() + c * kLanes;
+    const float inverse = grid.inverse[c];
+    for (int m = 0; m < kLanes; ++m) next[m] = inverse * sum[m];
+  }
+}
+
+void sweep(Grid& grid, int count) {
+  const Block& block = grid.medium.block;
+  for (int n = 0; n < count; ++n) {
+#pragma omp parallel for schedule(static)
+    for (int k = 0; k < block.nz; ++k)
+      for (int j = 0; j < block.ny; ++j) relax_row(grid, j, k);
+    grid.u.swap(grid.next);
+  }
+}
+
+FieldBatch fluence_of(const Grid& grid) {
+  FieldBatch x(grid.medium.block.cell_count(), kLanes);
+  for (int m = 0; m < kLanes; ++m)
+    for (std::size_t c = 0; c < x.cells; ++c) x.field(m)[c] = grid.u[c * kLanes + m];
+  return x;
+}
+
+}  // namespace
+
+RelaxationRun run_relaxation(const ForwardCase& problem, const FieldBatch& exact, double error) {
+  std::vector<float> light(problem.b.cells * kLanes);
+  for (int m = 0; m < kLanes; ++m)
+    for (std::size_t c = 0; c < problem.b.cells; ++c)
+      light[c * kLanes + m] = static_cast<float>(problem.b.field(m)[c]);
+  RelaxationRun run;
+  auto start = std::chrono::steady_clock::now();
+  const auto stop_clock = [&] {
+    run.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  std::vector<Grid> grids;
+  grids.push_back(make_grid(problem.medium, std::move(light)));
+  while (grids.back().medium.block.cell_count() > 200) {
+    const Grid& fine = grids.back();
+    Medium coarse = coarsened(fine.medium);
+    std::vector<float> b = gathered(fine.medium.block, coarse.block, fine.b);
+    grids.push_back(make_grid(std::move(coarse), std::move(b)));
+  }
+  for (std::size_t level = grids.size() - 1; level > 0; --level) {
+    sweep(grids[level], kCoarseSweeps);
+    scatter(grids[level], grids[level - 1]);
+  }
+  do {
+    sweep(grids.front(), kLook);
+    run.sweeps += kLook;
+    stop_clock();
+    run.error = front_face_error(problem, fluence_of(grids.front()), exact);
+    start = std::chrono::steady_clock::now();
+  } while (run.error > error && run.sweeps < kMostSweeps);
+  return run;
+}
+
+}  // namespace opaline::bench
