@@ -140,13 +140,13 @@ void SessionHistory::on_resumed() {
   }
 }
 
-Decision decide(const SessionHistory& history, bool alive) {
+Decision decide(const SessionHistory& history, bool alive, bool cancel_wished) {
   const std::size_t last = kStages.size() - 1;
+  const bool cancelling = cancel_wished || history.cancel_requested();
   if (alive) {
     const std::size_t started = first_in(history, StageState::kStarted);
     const std::size_t running =
         started <= last ? started : std::min(first_unfinished(history), last);
-    const bool cancelling = history.cancel_requested();
     return {
         cancelling ? SessionState::kCancelling : SessionState::kRunning, Action::kNone, running};
   }
@@ -157,7 +157,7 @@ Decision decide(const SessionHistory& history, bool alive) {
   const std::size_t next = std::min(first_unfinished(history), last);
   if (history.cancelled()) return {SessionState::kCancelled, Action::kNone, next};
   const Decision decision = decide_next(history);
-  if (history.cancel_requested() && !is_over(decision.state)) {
+  if (cancelling && !is_over(decision.state)) {
     return {SessionState::kCancelling, Action::kCloseCancel, decision.stage};
   }
   return decision;

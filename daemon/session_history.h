@@ -93,7 +93,8 @@ struct Decision {
 /// A stage that died is started again until this many runs in a row logged no fact.
 inline constexpr int kFruitlessRuns = 3;
 
-/// `alive`: a job holds the session's lock, or has been started and not ended yet.
-Decision decide(const SessionHistory& history, bool alive);
+/// `alive`: a job holds the session's lock, or has been started and not ended yet. `cancel_wished`:
+/// is_cancel_wished(), looked at after the log, since a resume forgets the wish before it says so.
+Decision decide(const SessionHistory& history, bool alive, bool cancel_wished);
 
 }  // namespace opaline::daemon

@@ -1,6 +1,7 @@
 #include "daemon/session_snapshot.h"
 
 #include "base/lock.h"
+#include "daemon/cancel_wish.h"
 #include "daemon/event_follower.h"
 
 namespace opaline::daemon {
@@ -40,7 +41,7 @@ Result<SessionSnapshot> read_snapshot(const SessionDirectory& session) {
   if (!events) return events.error();
   SessionHistory history;
   for (const Event& event : *events) history.apply(event);
-  return make_snapshot(session, history, decide(history, *alive));
+  return make_snapshot(session, history, decide(history, *alive, is_cancel_wished(session)));
 }
 
 nlohmann::json to_json(const SessionSnapshot& snapshot) {

@@ -5,6 +5,7 @@
 #include "base/event_log.h"
 #include "base/lock.h"
 #include "base/log.h"
+#include "daemon/cancel_wish.h"
 #include "daemon/jobs/control_client.h"
 
 namespace opaline::daemon {
@@ -26,17 +27,13 @@ Result<Decision> SessionSupervisor::look() {
   return decide_now(*held || child_ != nullptr);
 }
 
-// What the log says, and what we know beside it: a wish to cancel, a program that does not start.
+// What the directory says, and what we know beside it: a program that does not start.
 Result<Decision> SessionSupervisor::decide_now(bool alive) {
   const Result<std::vector<Event>> events = follower_.poll();
   if (!events) return events.error();
   for (const Event& event : *events) history_.apply(event);
-  Decision decision = decide(history_, alive);
-  if (is_over(decision.state)) return decision;
-  if (cancel_wanted_) {
-    decision.state = SessionState::kCancelling;
-    if (decision.action != Action::kNone) decision.action = Action::kCloseCancel;
-  } else if (decision.action == Action::kStart && !start_failure_.empty()) {
+  Decision decision = decide(history_, alive, is_cancel_wished(session_));
+  if (decision.action == Action::kStart && !start_failure_.empty()) {
     decision.action = Action::kGiveUp;
   }
   return decision;
@@ -51,7 +48,7 @@ Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
   if (decision->action == Action::kGiveUp || decision->action == Action::kCloseCancel) {
     if (decision = look(); !decision) return decision.error();
   }
-  if (is_over(decision->state)) cancel_wanted_ = cancel_sent_ = false;
+  if (decision->state != SessionState::kCancelling) cancel_sent_ = false;
   SessionSnapshot snapshot = make_snapshot(session_, history_, *decision);
   if (decision->action == Action::kStart && child_ != nullptr) {
     snapshot.state = SessionState::kRunning;
@@ -141,22 +138,28 @@ void SessionSupervisor::ask_to_stop() {
 
 Result<void> SessionSupervisor::resume() {
   start_failure_.clear();
-  cancel_wanted_ = false;
-  return log_under_lock("session.resumed", nlohmann::json::object(), [](const Decision& d) {
-    return d.state == SessionState::kFailed || d.state == SessionState::kCancelled;
-  });
+  const auto is_due = [this](const Decision& decision) -> Result<bool> {
+    if (decision.state != SessionState::kFailed && decision.state != SessionState::kCancelled) {
+      return false;
+    }
+    auto forgotten = forget_cancel(neighbours_.files, session_);
+    return forgotten ? Result<bool>(true) : forgotten.error();
+  };
+  return log_under_lock("session.resumed", nlohmann::json::object(), is_due);
 }
 
 // The log has one writer, the holder of the lock; under it the decision is made again.
 Result<void> SessionSupervisor::log_under_lock(
     std::string_view type,
     const nlohmann::json& data,
-    const std::function<bool(const Decision&)>& still_due) {
+    const std::function<Result<bool>(const Decision&)>& still_due) {
   const Result<FileLock> lock = FileLock::acquire(session_.lock());
   if (!lock) return lock.error();
   const Result<Decision> decision = decide_now(false);
   if (!decision) return decision.error();
-  if (!still_due(*decision)) return ok();
+  const Result<bool> due = still_due(*decision);
+  if (!due) return due.error();
+  if (!*due) return ok();
   const auto log = EventLog::open(neighbours_.files, session_.events());
   if (!log) return log.error();
   if (auto appended = (*log)->append(type, data); !appended) return appended.error();

@@ -24,8 +24,9 @@ using BusyStations = std::set<std::filesystem::path>;
 ///
 ///   queued -> waiting for station -> running (stage by stage) -> succeeded | failed | cancelled
 ///
-/// Everything it must remember is in the log, so another supervisor goes on where this one was
-/// dropped; jobs outlive it. A stage that dies is started again, at most kFruitlessRuns times in a
+/// Everything it must remember is in the session's directory, so another supervisor goes on where this one was
+/// dropped; jobs outlive it. Once a cancel is wished (daemon/cancel_wish.h) the job is asked to stop,
+/// and no other is started. A stage that dies is started again, at most kFruitlessRuns times in a
 /// row without a fact logged; one that fails is not.
 /// Threads: one at a time.
 class SessionSupervisor {
@@ -48,9 +49,7 @@ class SessionSupervisor {
   /// Looks once, does what is due, and says how things are. To be called a few times a second.
   /// Errors: the log cannot be read, or a decision cannot be logged; later calls try again.
   Result<SessionSnapshot> step(BusyStations& stations);
-  /// From the next step on the session is cancelled: its job asked to stop, no other started.
-  void cancel() { cancel_wanted_ = true; }
-  /// What failed or was cancelled is tried again. kBusy while a job works on the session.
+  /// What failed or was cancelled is tried again, and a wish to cancel forgotten. kBusy while a job works on the session.
   Result<void> resume();
 
   const SessionDirectory& session() const { return session_; }
@@ -65,7 +64,7 @@ class SessionSupervisor {
   bool station_is_free(std::size_t stage, const BusyStations& stations) const;
   Result<void> log_under_lock(std::string_view type,
                               const nlohmann::json& data,
-                              const std::function<bool(const Decision&)>& still_due);
+                              const std::function<Result<bool>(const Decision&)>& still_due);
 
   SessionDirectory session_;
   std::filesystem::path station_lock_;
@@ -78,7 +77,6 @@ class SessionSupervisor {
   std::string start_failure_;  // why the stage cannot be started at all
   std::optional<std::chrono::nanoseconds> retry_after_;
   bool waiting_ = false;
-  bool cancel_wanted_ = false;
   bool cancel_sent_ = false;
 };
 

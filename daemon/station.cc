@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/log.h"
+#include "daemon/cancel_wish.h"
 #include "daemon/session_factory.h"
 
 namespace opaline::daemon {
@@ -120,7 +121,7 @@ Result<SessionSnapshot> Station::create_session(const NewSession& wish) {
     log::warning("{}", put.error().message);  // an index only: made anew at the next start
   }
   supervisor_.add(*session);
-  return make_snapshot(*session, SessionHistory(), decide(SessionHistory(), false));
+  return make_snapshot(*session, SessionHistory(), decide(SessionHistory(), false, false));
 }
 
 Result<std::vector<CatalogueEntry>> Station::list() { return catalogue_->list(kListLimit); }
@@ -158,10 +159,10 @@ Result<SessionSnapshot> Station::cancel(const std::string& id) {
   if (is_over(snapshot->state)) {
     return busy(fmt::format("session {} is over already: {}", id, to_string(snapshot->state)));
   }
-  if (!supervisor_.cancel(id)) {
-    if (const auto known = directory(id)) supervisor_.add(*known);
-    supervisor_.cancel(id);
-  }
+  const Result<SessionDirectory> session_directory = directory(id);
+  if (!session_directory) return session_directory.error();
+  if (auto wished = wish_cancel(system_files(), *session_directory); !wished) return wished.error();
+  supervisor_.add(*session_directory);
   snapshot->state = SessionState::kCancelling;
   return snapshot;
 }

@@ -23,16 +23,6 @@ void Supervisor::add(SessionDirectory session) {
   wake_.notify_all();
 }
 
-bool Supervisor::cancel(const std::string& id) {
-  const std::lock_guard guard(mutex_);
-  const auto it = active_.find(id);
-  if (it == active_.end()) return false;
-  it->second.supervisor.cancel();
-  woken_ = true;
-  wake_.notify_all();
-  return true;
-}
-
 std::optional<SessionSnapshot> Supervisor::snapshot(const std::string& id) const {
   const std::lock_guard guard(snapshots_mutex_);
   const auto it = snapshots_.find(id);

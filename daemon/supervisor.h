@@ -31,10 +31,8 @@ class Supervisor {
   Supervisor(SessionSupervisor::Neighbours neighbours, Hooks hooks)
       : Supervisor(neighbours, std::move(hooks), Options()) {}
 
-  /// Takes care of a session until it is over; adding it twice changes nothing.
+  /// Takes care of a session until it is over, and looks at it at once; adding it twice is fine.
   void add(SessionDirectory session);
-  /// False when the session is not being taken care of.
-  bool cancel(const std::string& id);
   /// The newest snapshot of a session that is being taken care of.
   std::optional<SessionSnapshot> snapshot(const std::string& id) const;
 

@@ -2,6 +2,7 @@
 #include <csignal>
 #include <stop_token>
 
+#include "daemon/cancel_wish.h"
 #include "daemon/cli/run.h"
 #include "daemon/cli/terminal.h"
 #include "daemon/event_follower.h"
@@ -37,8 +38,13 @@ Result<Ending> run_locally(const SessionDirectory& session,
   });
   if (!signals) return signals.error();
   SessionState told = SessionState::kQueued;
+  bool wished = false;
   for (SystemClock pause;; pause.sleep(kPeriod, leave.get_token())) {
-    if (cancel) supervisor.cancel();
+    if (cancel && !wished) {
+      const auto wish = wish_cancel(system_files(), session);
+      if (!wish) return wish.error();
+      wished = true;
+    }
     BusyStations stations;
     const Result<SessionSnapshot> snapshot = supervisor.step(stations);
     if (!snapshot) return snapshot.error();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/lock.h"
+#include "daemon/cancel_wish.h"
 #include "daemon/event_follower.h"
 #include "daemon/problem.h"
 
@@ -62,7 +63,8 @@ class SessionEvents : public TextStream {
         if (event.seq > since_) pending_.push_back(std::move(event));
       }
     }
-    SessionSnapshot snapshot = make_snapshot(session_, history_, decide(history_, held && *held));
+    const Decision decision = decide(history_, held && *held, is_cancel_wished(session_));
+    SessionSnapshot snapshot = make_snapshot(session_, history_, decision);
     station_.refine(snapshot);
     return snapshot;
   }

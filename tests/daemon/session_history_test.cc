@@ -19,13 +19,18 @@ class History {
     history_.apply({++seq_, "", type, data});
     return *this;
   }
-  Decision dead() const { return decide(history_, false); }
-  Decision alive() const { return decide(history_, true); }
+  History& cancel_wished() {
+    wished_ = true;
+    return *this;
+  }
+  Decision dead() const { return decide(history_, false, wished_); }
+  Decision alive() const { return decide(history_, true, wished_); }
   const SessionHistory& get() const { return history_; }
 
  private:
   SessionHistory history_;
   std::uint64_t seq_ = 0;
+  bool wished_ = false;
 };
 
 TEST(SessionHistory, OfAnEmptyLogStartsTheFirstStage) {
@@ -136,6 +141,14 @@ TEST(SessionHistory, RemembersAWishToCancelOfAJobThatDiedBeforeItCouldStop) {
   EXPECT_EQ(history.dead().action, Action::kCloseCancel);
   history.add("session.cancelled");
   EXPECT_EQ(history.dead().state, SessionState::kCancelled);
+}
+
+TEST(SessionHistory, FollowsAWishToCancelUnlessTheSessionIsOver) {
+  EXPECT_EQ(History().cancel_wished().dead().action, Action::kCloseCancel);
+  EXPECT_EQ(History().started("capture").cancel_wished().alive().state, SessionState::kCancelling);
+  History over;
+  over.done("capture").done("reconstruct").done("preview").cancel_wished();
+  EXPECT_EQ(over.dead().state, SessionState::kSucceeded);
 }
 
 TEST(SessionHistory, ResumesWhatFailedAndKeepsWhatWasDone) {

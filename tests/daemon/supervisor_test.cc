@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "base/lock.h"
+#include "daemon/cancel_wish.h"
 #include "daemon/jobs/station_lock.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
@@ -40,6 +41,10 @@ class Supervision : public ::testing::Test {
         Supervisor::Hooks{[](const SessionDirectory&) { return station_lock_path("bench"); },
                           [](const SessionSnapshot&) {}},
         Supervisor::Options{std::chrono::milliseconds(5)});
+  }
+  static void cancel(Supervisor& supervisor, const SessionDirectory& session) {
+    EXPECT_TRUE(wish_cancel(system_files(), session));
+    supervisor.add(session);  // looks at once
   }
   static SessionState state_of(const SessionDirectory& session) {
     const auto snapshot = read_snapshot(session);
@@ -138,7 +143,7 @@ TEST_F(Supervision, CancelsARunningSession) {
   supervisor->add(session);
   ASSERT_TRUE(becomes(session, SessionState::kRunning));
 
-  EXPECT_TRUE(supervisor->cancel("a"));
+  cancel(*supervisor, session);
 
   EXPECT_TRUE(becomes(session, SessionState::kCancelled));
 }
@@ -151,9 +156,44 @@ TEST_F(Supervision, CancelsASessionThatWaits) {
   supervisor->add(session);
   ASSERT_TRUE(eventually([&] { return supervisor->snapshot("a").has_value(); }));
 
-  EXPECT_TRUE(supervisor->cancel("a"));
+  cancel(*supervisor, session);
 
   EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+}
+
+TEST_F(Supervision, RemembersAWishToCancelThatNoSupervisorSaw) {
+  turn_on("capture.hold");
+  const SessionDirectory session = make_session("a");
+  {
+    const auto supervisor = make_supervisor();
+    supervisor->add(session);
+    ASSERT_TRUE(becomes(session, SessionState::kRunning));
+  }
+  ASSERT_TRUE(wish_cancel(system_files(), session));
+
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+
+  EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+}
+
+TEST_F(Supervision, ForgetsTheWishToCancelWhenResumedAtOnce) {
+  turn_on("capture.hold");
+  const SessionDirectory session = make_session("a");
+  SessionSupervisor supervisor(session, {}, neighbours_);
+  const auto step = [&] {
+    BusyStations stations;
+    return supervisor.step(stations);
+  };
+  ASSERT_TRUE(eventually([&] { return step() && state_of(session) == SessionState::kRunning; }));
+  ASSERT_TRUE(wish_cancel(system_files(), session));
+  ASSERT_TRUE(step());  // asks; the job ends before the next look
+  ASSERT_TRUE(becomes(session, SessionState::kCancelled));
+
+  turn_off("capture.hold");
+  ASSERT_TRUE(SessionSupervisor(session, {}, neighbours_).resume());
+
+  EXPECT_TRUE(eventually([&] { return step() && state_of(session) == SessionState::kSucceeded; }));
 }
 
 TEST_F(Supervision, GoesOnWhereAnotherSupervisorStopped) {
