@@ -13,6 +13,17 @@ using std::chrono::nanoseconds;
 
 double count(nanoseconds time) { return static_cast<double>(time.count()); }
 
+// `span` is the longest exposure over the shortest.
+Error too_many(double ratio, double span) {
+  const double enough = std::pow(span, 1.0 / (static_cast<double>(kMaxExposures) - 2.0));
+  return invalid_argument(fmt::format(
+      "capture.exposures.ratio = {}: more than {} exposures for every light; expected at least "
+      "{:.2f}",
+      ratio,
+      kMaxExposures,
+      std::ceil(enough * 100.0) / 100.0));
+}
+
 double ms(nanoseconds time) { return std::chrono::duration<double, std::milli>(time).count(); }
 
 }  // namespace
@@ -39,6 +50,8 @@ Result<std::vector<nanoseconds>> exposure_ladder(const ExposureOptions& options,
   for (double turns = static_cast<double>(first); std::llround(turns) < last;
        turns = std::max(turns * options.ratio, turns + 1.0)) {
     ladder.push_back(period * std::llround(turns));
+    if (ladder.size() == kMaxExposures)
+      return too_many(options.ratio, turns_longest / static_cast<double>(first));
   }
   ladder.push_back(period * last);
   return ladder;

@@ -10,6 +10,9 @@
 
 namespace opaline::capture {
 
+/// The most exposures of one light.
+inline constexpr std::size_t kMaxExposures = 64;
+
 /// What a station can expose.
 struct ExposureLimits {
   std::chrono::nanoseconds wheel_period{};  ///< of the projector; 0: any exposure will do
@@ -20,7 +23,8 @@ struct ExposureLimits {
 /// The exposures a bracket may use, shortest first, each about `ratio` times the one before and a
 /// whole number of turns of the colour wheel, since a part of a turn would not mix the colours
 /// right. The last is the longest allowed.
-/// Errors: kInvalidArgument when no whole turn lies between the limits.
+/// Errors: kInvalidArgument when no whole turn lies between the limits, or when so small a ratio
+/// takes more than kMaxExposures from one to the other.
 Result<std::vector<std::chrono::nanoseconds>> exposure_ladder(const ExposureOptions& options,
                                                               const ExposureLimits& limits);
 

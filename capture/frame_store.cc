@@ -9,6 +9,7 @@
 
 #include "base/io/image_io.h"
 #include "base/sha256.h"
+#include "capture/exposure_plan.h"
 
 namespace opaline::capture {
 namespace {
@@ -94,6 +95,9 @@ Result<CapturedFrame> read_frame(const fs::path& directory, const json& entry) {
 Result<std::vector<CapturedFrame>> read_frames(const fs::path& directory, const json& index) {
   std::vector<CapturedFrame> frames;
   try {
+    if (index.at("frames").size() > kMaxExposures) {
+      return damaged(directory / "index.json", "it lists more frames than a light can have");
+    }
     for (const json& entry : index.at("frames")) {
       auto frame = read_frame(directory, entry);
       if (!frame) return frame.error();

@@ -43,6 +43,18 @@ TEST(ExposureLadder, NeedsNoWheel) {
                           nanoseconds(10'000'000)));
 }
 
+TEST(ExposureLadder, RefusesARatioThatTakesTooManyAndSaysWhichWouldDo) {
+  for (const double ratio : {1.0001, 1.02, 1.05}) {
+    const auto ladder =
+        exposure_ladder({.ratio = ratio}, {nanoseconds(0), kTurn, kStation.longest});
+    ASSERT_FALSE(ladder) << ratio;
+    EXPECT_EQ(ladder.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(ladder.error().message, HasSubstr("ratio"));
+    EXPECT_THAT(ladder.error().message, HasSubstr("at least 1.10"));
+  }
+  EXPECT_TRUE(exposure_ladder({.ratio = 1.10}, kStation));
+}
+
 TEST(ExposureLadder, RefusesALimitShorterThanATurn) {
   const auto ladder = exposure_ladder({.longest = nanoseconds(30'000'000)}, kStation);
   ASSERT_FALSE(ladder);
