@@ -97,6 +97,7 @@ Result<void> validate(const StationCalibration& calibration) {
       {c.bit_depth >= 8 && c.bit_depth <= 16, "camera.bit_depth", 1.0 * c.bit_depth, "8 to 16"},
       {black >= 0.0 && black < c.max_code(), "camera.black_level", black, ">= 0, below full scale"},
       {c.gain_electrons_per_code > 0.0, "camera.gain", c.gain_electrons_per_code, "> 0"},
+      {c.full_well_electrons >= 0.0, "camera.full_well", c.full_well_electrons, ">= 0"},
       {c.read_noise_electrons >= 0.0, "camera.read_noise", c.read_noise_electrons, ">= 0"},
       {c.vignetting.at(1.0) > 0.0,
        "camera.vignetting",
@@ -126,6 +127,18 @@ Electrons electrons_from_code(const CameraCalibration& camera, double code) {
   const Signal signal = signal_of(camera.response, (code - camera.black_level) / range);
   const double full_scale = camera.full_scale_electrons();
   return {signal.value * full_scale, signal.slope * full_scale / range};
+}
+
+double clipping_code(const CameraCalibration& camera) {
+  const double full_well = camera.full_well_electrons;
+  double high = camera.max_code();
+  if (full_well <= 0.0 || full_well >= camera.full_scale_electrons()) return high;
+  double low = camera.black_level;
+  for (int i = 0; i < 40; ++i) {  // bisection: the response rises
+    const double middle = 0.5 * (low + high);
+    (electrons_from_code(camera, middle).signal < full_well ? low : high) = middle;
+  }
+  return high;
 }
 
 Image<float> camera_vignetting(const CameraCalibration& camera) {

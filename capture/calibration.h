@@ -34,12 +34,15 @@ struct Vignetting {
 ///   electrons  = sensitivity . radiance . exposure . vignetting + leaks
 ///   full_scale = gain (max_code - black_level),   s = electrons / full_scale
 ///   code       = black_level + (max_code - black_level) . f(s)
+///
+/// and nothing of what lies above full_scale, or above its full well where that is less.
 struct CameraCalibration {
   CameraModel model;
   int bit_depth = 12;
   ResponseCurve response;
   double black_level = 64.0;                         ///< code without light
   double gain_electrons_per_code = 2.5;              ///< of the linear response
+  double full_well_electrons = 0.0;                  ///< where a pixel clips; 0: at full scale
   double read_noise_electrons = 3.0;                 ///< standard deviation
   Vignetting vignetting;                             ///< about the picture's middle
   std::array<double, 3> sensitivity{1e9, 1e9, 1e9};  ///< electrons per (W/(mm^2 sr) s), per channel
@@ -83,6 +86,9 @@ struct Electrons {
   double per_code = 1.0;
 };
 Electrons electrons_from_code(const CameraCalibration& camera, double code);
+
+/// The code at which pixels clip: the highest, or that of a full well below full scale.
+double clipping_code(const CameraCalibration& camera);
 
 /// Vignetting of each camera pixel, 1 channel.
 Image<float> camera_vignetting(const CameraCalibration& camera);

@@ -11,12 +11,13 @@
 namespace opaline::capture {
 namespace {
 
-constexpr double kFullWeight = 0.65;  // of the code range: weights fall from here ...
+constexpr double kFullWeight = 0.65;  // of the codes up to clipping: weights fall from here ...
 constexpr double kNoWeight = 0.95;    // ... to here
 constexpr double kSaturated = 0.98;   // clipped, in the shortest exposure
 
-double range_share(const CameraCalibration& camera, int code) {
-  return (code - camera.black_level) / (camera.max_code() - camera.black_level);
+// Of the codes from black to where pixels clip.
+double range_share(const CameraCalibration& camera, double clipping, int code) {
+  return (code - camera.black_level) / (clipping - camera.black_level);
 }
 
 double weight_of(double share) {
@@ -44,7 +45,8 @@ HdrMerge::HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot)
     : camera_(camera),
       hot_(std::move(hot)),
       vignetting_(camera_vignetting(camera)),
-      electrons_(electrons_table(camera)) {
+      electrons_(electrons_table(camera)),
+      clipping_code_(clipping_code(camera)) {
   ENSURE(hot_.width() == camera.model.width && hot_.height() == camera.model.height);
 }
 
@@ -55,14 +57,15 @@ HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
   struct Term {
     double weight, seconds, leak, leak_scale, per_code, black_per_code;
   };
-  std::array<Term, 64> terms;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+  std::array<Term, kMaxExposures>
+      terms;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
   std::size_t count = 0;
   double electrons = 0.0;
   double seconds = 0.0;
   Sample sample;
   for (const ExposurePair& pair : sorted) {
     const std::uint16_t code = pair.light->at(x, y, channel);
-    const double share = range_share(camera_, code);
+    const double share = range_share(camera_, clipping_code_, code);
     const bool shortest = count == 0;
     if (shortest) sample.saturated = share >= kSaturated;
     const double weight = shortest ? 1.0 : weight_of(share);
@@ -88,7 +91,7 @@ HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
 }
 
 HdrImage HdrMerge::merge(std::span<const ExposurePair> bracket) const {
-  ENSURE(!bracket.empty() && bracket.size() <= 64);
+  ENSURE(!bracket.empty() && bracket.size() <= kMaxExposures);
   std::vector<ExposurePair> sorted(bracket.begin(), bracket.end());
   std::ranges::stable_sort(sorted, {}, &ExposurePair::light_seconds);
   const int width = camera_.model.width;
@@ -120,6 +123,7 @@ FrameLight measure_light(const CameraCalibration& camera,
                          const Image<std::uint8_t>& footprint,
                          double dark_quantile) {
   const double scale = pair.light_seconds / pair.black_seconds;
+  const double clipping = clipping_code(camera);
   std::vector<double> snrs;
   double sum = 0.0;
   double variance = 0.0;
@@ -131,7 +135,7 @@ FrameLight measure_light(const CameraCalibration& camera,
       for (int c = 0; c < 3; ++c) {
         const int code = pair.light->at(x, y, c);
         ++pixels;
-        if (range_share(camera, code) >= kNoWeight) ++saturated;
+        if (range_share(camera, clipping, code) >= kNoWeight) ++saturated;
         const Electrons light = electrons_from_code(camera, code);
         const Electrons black = electrons_from_code(camera, pair.black->at(x, y, c));
         const double net = light.signal - black.signal * scale;

@@ -32,15 +32,15 @@ struct HdrImage {
 ///   sum_i w_i e_i / sum_i w_i t_i
 ///
 /// so each exposure weighs by its time, which needs no noise parameter and has no bias. w_i falls
-/// linearly from 1 to 0 between 65 % and 95 % of the code range (1 throughout in the shortest
-/// exposure): a hard limit on noisy codes would select the low ones. The variance is that of the
+/// linearly from 1 to 0 between 65 % and 95 % of the codes up to clipping (1 throughout in the
+/// shortest exposure): a hard limit on noisy codes would select the low ones. The variance is that of the
 /// sum under the camera's noise model, evaluated at the estimate: shot noise of light and leak,
 /// read noise and quantisation, of both frames of each pair.
 class HdrMerge {
  public:
   /// `hot` marks pixels (1) to leave out.
   HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot);
-  /// At least one pair, in any order, all of the camera's size.
+  /// 1 to kMaxExposures pairs, in any order, all of the camera's size.
   HdrImage merge(std::span<const ExposurePair> bracket) const;
 
  private:
@@ -54,6 +54,7 @@ class HdrMerge {
   Image<std::uint8_t> hot_;
   Image<float> vignetting_;
   std::vector<Electrons> electrons_;  // by code
+  double clipping_code_;
 };
 
 /// Light of one exposure above black, over the pixels where `footprint` is 1.

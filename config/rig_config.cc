@@ -195,6 +195,7 @@ capture::StationCalibration truth_of(const sim::RigOptions& rig) {
   camera.response.gamma = rig.camera.response_gamma;
   camera.black_level = rig.camera.black_level;
   camera.gain_electrons_per_code = rig.camera.gain_electrons_per_code;
+  camera.full_well_electrons = rig.camera.full_well_electrons;
   camera.read_noise_electrons = rig.camera.read_noise_electrons;
   camera.vignetting.coefficients = rig.camera.vignetting;
   camera.sensitivity = rig.camera.sensitivity;
@@ -248,6 +249,9 @@ void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool
   fields.number({"black_level", "code without light"}, c.black_level, kAtLeast0);
   fields.check(c.black_level < c.max_code(), "black_level", "expected less than the highest code");
   fields.number({"gain_electrons_per_code", ""}, c.gain_electrons_per_code, kAbove0);
+  fields.number({"full_well_electrons", "where a pixel clips; 0: at the highest code"},
+                c.full_well_electrons,
+                kAtLeast0);
   fields.number({"read_noise_electrons", "standard deviation"}, c.read_noise_electrons, kAtLeast0);
   fields.numbers(kVignetting, c.vignetting.coefficients);
   fields.check(

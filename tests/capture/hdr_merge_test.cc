@@ -135,6 +135,21 @@ TEST(HdrMerge, MasksWhatTheShortestExposureClips) {
   EXPECT_NEAR(m.masked, 1.0, 1e-9);
 }
 
+// The noisy camera itself has no full well: it gets the light that fills one. A tenth of the channels
+// stays 2 % below by shot noise, of the pixels a thousandth in all three.
+TEST(HdrMerge, MasksWhatTheShortestExposureFillsThroughAnyResponse) {
+  CameraCalibration c = camera();
+  c.full_well_electrons = 4000.0;
+  EXPECT_NEAR(clipping_code(c), 64.0 + 4000.0 / 2.5, 1e-6);
+  EXPECT_NEAR(merged(c, 4000.0 * 30.0, 3).masked, 1.0, 0.01);
+  c.response = {ResponseCurve::Kind::kGamma, 1.4, {}};
+  EXPECT_NEAR(clipping_code(c),
+              64.0 + (4095.0 - 64.0) * std::pow(4000.0 / c.full_scale_electrons(), 1.0 / 1.4),
+              1e-6);
+  c.full_well_electrons = 1e6;
+  EXPECT_EQ(clipping_code(c), c.max_code());
+}
+
 TEST(HdrMerge, LeavesOutHotPixelsAndUndoesVignetting) {
   CameraCalibration c = camera();
   c.vignetting = {{-0.4, 0.1, 0.0}};

@@ -255,6 +255,19 @@ TEST_F(SequenceTest, RetakesARegionWhoseFrameFileWasTruncatedAndNamesTheFile) {
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
 }
 
+TEST_F(SequenceTest, RetakesARegionWhoseIndexListsMoreFramesThanThereCanBe) {
+  ASSERT_TRUE(run(dir_.path()));
+  const fs::path path = dir_.path() / "frames" / "region_0_1" / "index.json";
+  auto index = nlohmann::json::parse(read_text(path).value());
+  const auto frame = index["frames"][0];
+  while (index["frames"].size() < 65) index["frames"].push_back(frame);
+  ASSERT_TRUE(write_whole(system_files(), path, index.dump()));
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 1);
+  EXPECT_EQ(results_of(dir_.path()), undisturbed());
+}
+
 TEST_F(SequenceTest, RetakesBlackFramesThatWereDamaged) {
   ASSERT_TRUE(run(dir_.path()));
   for (const auto& entry : fs::directory_iterator(dir_.path() / "frames" / "black")) {
@@ -362,6 +375,15 @@ TEST_F(SequenceTest, StopsWhenTooManyRegionsAreSaturatedAndSaysWhatWouldHelp) {
   EXPECT_THAT(summary.error().message,
               AllOf(HasSubstr("3 of 4 regions"), HasSubstr("saturated"), HasSubstr("aperture")));
   EXPECT_EQ(events_->facts("region.unusable").size(), 3u);
+}
+
+TEST_F(SequenceTest, SeesThatPixelsAreFullBelowTheHighestCode) {
+  options_.camera.sensitivity = {1e13, 1e13, 1e13};
+  options_.camera.full_well_electrons = 5000.0;  // half the codes
+  task_ = support::tiny_task(options_);
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_THAT(summary.error().message, AllOf(HasSubstr("3 of 4 regions"), HasSubstr("saturated")));
 }
 
 TEST_F(SequenceTest, RefusesOptionsThatMakeNoSense) {

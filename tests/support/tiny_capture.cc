@@ -19,6 +19,7 @@ capture::StationCalibration calibration_of(const sim::RigOptions& options) {
   }
   calibration.camera.black_level = c.black_level;
   calibration.camera.gain_electrons_per_code = c.gain_electrons_per_code;
+  calibration.camera.full_well_electrons = c.full_well_electrons;
   calibration.camera.read_noise_electrons = c.read_noise_electrons;
   calibration.camera.vignetting = {c.vignetting};
   calibration.camera.sensitivity = c.sensitivity;
