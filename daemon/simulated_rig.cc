@@ -11,16 +11,19 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include <sys/pidfd.h>
 }
 
+#include <algorithm>
 #include <span>
 #include <system_error>
 #include <utility>
 
 #include "base/file_descriptor.h"
 #include "base/files.h"
+#include "base/io/transport_io.h"
 #include "base/lock.h"
 #include "base/log.h"
 #include "base/sha256.h"
 #include "config/session_config.h"
+#include "daemon/jobs/version.h"
 #include "sim/rig_client.h"
 #include "sim/rig_message.h"
 #include "sim/transport_store.h"
@@ -111,20 +114,24 @@ Result<void> wait_until_it_answers(const RigProcess& process,
   return ok();
 }
 
-/// Waits for a rig that was asked to end to let go of its socket.
-Result<void> wait_until_gone(const RigProcess& process, const std::stop_token& stop) {
+/// Whether the right rig answers. One that was asked to end, or does not answer yet, is given time to do either.
+Result<bool> answers_in_the_end(const RigProcess& process, const std::stop_token& stop) {
   std::filesystem::path lock = process.socket;
   lock += ".lock";
-  const Deadline deadline = std::chrono::steady_clock::now() + 10s;
-  for (;;) {
+  const Deadline deadline =
+      std::chrono::steady_clock::now() + std::min<std::chrono::seconds>(process.patience, 10s);
+  while (!answers(process)) {
     const auto held = FileLock::is_held(lock);
-    if (!held || !*held) return ok();
-    const auto waited = sim::wait_for(-1, 0, std::chrono::steady_clock::now() + 20ms, stop);
+    if (!held || !*held) return false;
+    const auto waited = sim::wait_for(-1, 0, std::chrono::steady_clock::now() + 100ms, stop);
     if (!waited && waited.error().code == ErrorCode::kCancelled) return waited.error();
     if (std::chrono::steady_clock::now() >= deadline) {
-      return timeout(fmt::format("the rig at {} does not end", process.socket.string()));
+      return timeout(
+          fmt::format("the rig at {} holds its lock, but neither answers nor ends; is it stopped?",
+                      process.socket.string()));
     }
   }
+  return true;
 }
 
 }  // namespace
@@ -133,7 +140,10 @@ std::string rig_identity(const config::SimConfig& sim) {
   config::SessionConfig session;
   session.rig.sim = sim;
   session.rig.sim.socket.clear();
-  const std::string text = config::to_toml(session);
+  std::string text = config::to_toml(session);
+  text += version();
+  text += sim::transport_key(sim.scene, sim.transport);  // has the algorithm's version
+  text += transport_checksum(sim.responses).value_or("");
   return sha256_hex(std::as_bytes(std::span(text)));
 }
 
@@ -151,9 +161,10 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
 }
 
 Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop) {
-  if (answers(process)) return ok();
+  const auto there = answers_in_the_end(process, stop);
+  if (!there) return there.error();
+  if (*there) return ok();
   if (auto made = system_files().make_directories(process.socket.parent_path()); !made) return made;
-  if (auto gone = wait_until_gone(process, stop); !gone) return gone;
   const auto pid = spawn(process);
   if (!pid) return pid.error();
   log::info("simulated rig: process {} at {}", *pid, process.socket.string());

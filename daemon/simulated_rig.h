@@ -15,7 +15,8 @@
 
 namespace opaline::daemon {
 
-/// A hash of everything that a simulated station is made from: two of one identity give the same pixels.
+/// A hash of everything that a simulated station is made from, by which release: its options, and the content of the
+/// stored light transport that they name. Two of one identity give the same pixels.
 std::string rig_identity(const config::SimConfig& sim);
 
 /// Builds the station of a rig file. Its light transport is read, or computed with progress where it is not stored,
@@ -41,7 +42,8 @@ struct RigProcess {
 /// the caller, has its own session, and writes its log to SOCKET.log.
 ///
 /// Errors: kUnavailable, with the log's name, when it cannot be started or ends at once; kTimeout; kCancelled; after
-/// each of these none is left that was started here.
+/// each of these none is left that was started here. A rig that holds its lock but neither answers nor ends, as a
+/// stopped process does, is a kTimeout after 10 s (or `patience`) that says so.
 Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop);
 
 }  // namespace opaline::daemon

@@ -252,4 +252,11 @@ Result<TransportResponses> read_transport(const std::filesystem::path& path) {
   return responses;
 }
 
+Result<std::string> transport_checksum(const std::filesystem::path& path) {
+  const auto bytes = read_bytes(path, kMostBytes);
+  if (!bytes) return bytes.error();
+  if (bytes->size() < kHashLength) return invalid_argument(path.string() + ": cut short");
+  return std::string(text_of(std::span(*bytes).last(kHashLength).first(kHashLength - 1)));
+}
+
 }  // namespace opaline

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/files.h"
@@ -34,5 +35,8 @@ Result<void> write_transport(FileOperations& files,
                              const std::filesystem::path& path,
                              const TransportResponses& responses);
 Result<TransportResponses> read_transport(const std::filesystem::path& path);
+
+/// The checksum that a file ends with, 64 hexadecimal digits, which stands for its content; not compared with it.
+Result<std::string> transport_checksum(const std::filesystem::path& path);
 
 }  // namespace opaline
