@@ -3,14 +3,25 @@
 #include "sim/rig_client.h"
 
 namespace opaline::daemon {
+namespace {
+
+/// Not the acknowledgement counts, but what the lamp does.
+Result<void> make_dark(const std::filesystem::path& socket) {
+  sim::RigClient rig(socket);
+  if (auto told = rig.dark(sim::RigPort::kAnybody); !told) return told;
+  const auto status = rig.status();
+  if (!status) return status.error();
+  if (status->lamp_on) return unavailable("the lamp was told to go dark, and is still on");
+  return ok();
+}
+
+}  // namespace
 
 std::function<Result<void>()> light_switch(const config::RigConfig& rig) {
   const bool outlives_job =
       rig.projector == config::Driver::kSim && rig.sim.run == config::RigPlace::kProcess;
   if (!outlives_job) return [] { return ok(); };
-  return [socket = config::rig_socket(rig)] {
-    return sim::RigClient(socket).dark(sim::RigPort::kAnybody);
-  };
+  return [socket = config::rig_socket(rig)] { return make_dark(socket); };
 }
 
 }  // namespace opaline::daemon

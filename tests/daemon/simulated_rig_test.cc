@@ -3,13 +3,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <signal.h>
+#include <sys/socket.h>
+
 #include <cstdlib>
 
 #include "base/files.h"
+#include "base/unix_socket.h"
 #include "config/session_config.h"
+#include "daemon/light_switch.h"
 #include "sim/rig_client.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_projector.h"
+#include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::daemon {
@@ -42,6 +48,7 @@ cache = "cache"
 class SimulatedRigTest : public ::testing::Test {
  protected:
   void TearDown() override {
+    if (stopped_ > 0) ::kill(stopped_, SIGCONT);
     if (auto ended = sim::RigClient(socket_).end(); !ended) SUCCEED() << "there is none";
   }
   config::RigConfig read_rig(int seed) {
@@ -61,9 +68,19 @@ class SimulatedRigTest : public ::testing::Test {
             .patience = std::chrono::seconds(60)};
   }
 
+  /// The process that serves the socket.
+  pid_t rig_pid() const {
+    const auto connection = connect_unix(socket_);
+    ucred peer{};
+    socklen_t size = sizeof(peer);
+    EXPECT_EQ(::getsockopt(connection->get(), SOL_SOCKET, SO_PEERCRED, &peer, &size), 0);
+    return peer.pid;
+  }
+
   testing::TemporaryDirectory directory_;
   std::filesystem::path rig_file_ = directory_.path() / "rig.toml";
   std::filesystem::path socket_ = directory_.path() / "run" / "rig.sock";
+  pid_t stopped_ = 0;
 };
 
 TEST_F(SimulatedRigTest, IsStartedWhereNobodyServesAndFoundTheNextTime) {
@@ -84,6 +101,54 @@ TEST_F(SimulatedRigTest, OfOtherOptionsIsReplaced) {
   EXPECT_EQ(sim::RigClient(socket_).status()->identity, rig_identity(other.sim));
 }
 
+TEST_F(SimulatedRigTest, ThatIsStoppedIsSaidNotToAnswer) {
+  RigProcess process = process_of(read_rig(1));
+  ASSERT_TRUE(ensure_rig_process(process, {}));
+  stopped_ = rig_pid();
+  ASSERT_EQ(::kill(stopped_, SIGSTOP), 0);
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(sim::RigClient(socket_).status().error().code, ErrorCode::kTimeout);
+  EXPECT_LT(std::chrono::steady_clock::now() - start,
+            std::chrono::seconds(4));  // 2, and a busy machine
+  process.patience = std::chrono::seconds(1);
+  const auto found = ensure_rig_process(process, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::kTimeout);
+  EXPECT_THAT(found.error().message, HasSubstr("neither answers nor ends; is it stopped?"));
+}
+
+TEST_F(SimulatedRigTest, IsAnotherWhenItsStoredLightTransportIs) {
+  config::SimConfig sim = read_rig(1).sim;
+  sim.responses = directory_.path() / "stored.transport";
+  std::vector<std::string> identities;
+  for (const char digit : {'a', 'b'}) {
+    ASSERT_TRUE(write_whole(system_files(), sim.responses, "..." + std::string(64, digit) + "\n"));
+    identities.push_back(rig_identity(sim));
+    EXPECT_EQ(rig_identity(sim), identities.back());
+  }
+  EXPECT_NE(identities[0], identities[1]);
+}
+
+TEST_F(SimulatedRigTest, ItsLightSwitchSucceedsOnlyWhenTheLampIsDark) {
+  config::RigConfig rig = read_rig(1);
+  rig.sim.socket = socket_;
+  ASSERT_TRUE(ensure_rig_process(process_of(rig), {}));
+  sim::RigClient client(socket_);
+  sim::SimProjector projector(client);
+  ASSERT_TRUE(projector.open());
+  const auto info = projector.info();
+  ASSERT_TRUE(info);
+  ASSERT_TRUE(projector.show({1, Image<std::uint8_t>(info->width, info->height, 3, 255)}, {}));
+  ASSERT_TRUE(testing::eventually([&] { return client.status()->lamp_on; }));
+  ASSERT_TRUE(client.arm({{.kind = sim::FaultKind::kLampStuck}}));
+  const auto make_dark = light_switch(rig);
+  const auto stuck = make_dark();
+  ASSERT_FALSE(stuck);
+  EXPECT_THAT(stuck.error().message, HasSubstr("still on"));
+  EXPECT_TRUE(make_dark());
+  EXPECT_FALSE(client.status()->lamp_on);
+}
+
 TEST_F(SimulatedRigTest, GivesTheSamePixelsInAProcessAsInside) {
   const config::RigConfig rig = read_rig(1);
   ASSERT_TRUE(ensure_rig_process(process_of(rig), {}));
@@ -96,9 +161,15 @@ TEST_F(SimulatedRigTest, GivesTheSamePixelsInAProcessAsInside) {
   for (sim::RigPort* port :
        {static_cast<sim::RigPort*>(inside->get()), static_cast<sim::RigPort*>(&outside)}) {
     sim::SimCamera camera(*port);
+    sim::SimProjector projector(*port);
     ASSERT_TRUE(camera.open());
-    const auto frame = camera.capture({std::chrono::seconds(1), 0}, {});
+    ASSERT_TRUE(projector.open());
+    const auto info = projector.info();
+    ASSERT_TRUE(projector.show({1, Image<std::uint8_t>(info->width, info->height, 3, 255)}, {}));
+    ASSERT_TRUE(testing::eventually([&] { return port->status()->lamp_on; }));
+    const auto frame = camera.capture({std::chrono::seconds(1), 1}, {});
     ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->pattern_id, 1u);
     hashes[i++] = frame->sha256;
   }
   EXPECT_EQ(hashes[0], hashes[1]);
