@@ -1,0 +1,132 @@
+// The real programs from a configuration to a report, on the tiny session, the daemon killed on the way.
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/event_log.h"
+#include "base/files.h"
+#include "base/io/volume_io.h"
+#include "base/session_directory.h"
+#include "bench/faults/fault_bed.h"
+#include "tests/support/process.h"
+
+namespace opaline::faults {
+namespace {
+
+using testing::eventually;
+using ::testing::HasSubstr;
+using testing::Process;
+
+std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+
+class WholeSession : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = FaultBed::create({programs()});
+    ASSERT_TRUE(made) << made.error().message;
+    bed_ = *std::move(made);
+  }
+  std::filesystem::path in_bed(const std::string& name) const { return bed_->root() / name; }
+
+  std::unique_ptr<Process> spawn(std::vector<std::string> command,
+                                 const std::string& output) const {
+    command.front() = (programs() / command.front()).string();
+    return std::make_unique<Process>(
+        command,
+        Process::Environment{{"OPALINE_SOCKET", in_bed("opalined.sock").string()}},
+        in_bed(output));
+  }
+  void start_daemon() {
+    daemon_ = spawn({"opalined", "--sessions", in_bed("sessions").string(), "--port", "0"},
+                    "opalined.out");
+    ASSERT_TRUE(eventually([&] { return says(*daemon_, "sessions in"); })) << daemon_->output();
+  }
+  static bool says(const Process& process, const std::string& what) {
+    return process.output().find(what) != std::string::npos;
+  }
+
+  /// The one session that the daemon has; empty before.
+  std::filesystem::path session() const {
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator(in_bed("sessions"), none)) {
+      if (std::filesystem::exists(entry.path() / "session.json", none)) return entry.path();
+    }
+    return {};
+  }
+  std::ptrdiff_t count(const std::string& type) const {
+    const auto log = read_events(session() / "events.jsonl");
+    return log ? std::ranges::count(log->events, type, &Event::type) : 0;
+  }
+
+  std::unique_ptr<FaultBed> bed_;
+  std::unique_ptr<Process> daemon_;
+};
+
+/// Numbers only: what is not finite becomes null in JSON, and what is missing too.
+void expect_numbers(const nlohmann::json& json, const std::vector<std::string>& pointers) {
+  for (const std::string& pointer : pointers) {
+    const nlohmann::json::json_pointer place(pointer);
+    EXPECT_TRUE(json.contains(place) && json[place].is_number()) << pointer;
+  }
+}
+
+TEST_F(WholeSession, GoesFromAConfigurationToItsReportThoughTheDaemonIsKilled) {
+  start_daemon();
+  const auto run = spawn({"opaline", "run", in_bed("session.toml").string()}, "opaline.out");
+  ASSERT_TRUE(eventually([&] { return count("region.captured") > 0; })) << run->output();
+
+  daemon_->kill(SIGKILL);
+  daemon_->wait();
+  start_daemon();
+
+  EXPECT_EQ(run->wait(), 0) << run->output() << daemon_->output();
+  EXPECT_EQ(count("region.captured"), 6);  // the capture lived on
+  EXPECT_THAT(run->output(), HasSubstr((session() / "report.html").string()));
+  const auto page = read_text(session() / "report.html");
+  ASSERT_TRUE(page) << page.error().message;
+  EXPECT_THAT(*page, HasSubstr("</html>"));
+  const auto text = read_text(session() / "results.json");
+  ASSERT_TRUE(text) << text.error().message;
+  const auto results = nlohmann::json::parse(*text, nullptr, false);
+  expect_numbers(results,
+                 {"/relighting_error",
+                  "/relighting_noise_floor",
+                  "/seconds",
+                  "/relighting/lights/0/error",
+                  "/relighting/lights/1/noise_floor",
+                  "/fit/0/chi_squared_per_datum",
+                  "/reconstruction/channels/2/chi_squared_per_datum"});
+  EXPECT_EQ(results["relighting"]["lights"].size(), 2U);
+  EXPECT_EQ(results["fit"].size(), 6U);
+}
+
+TEST_F(WholeSession, LeavesAMaterialThatOtherProgramsRead) {
+  const auto session = bed_->new_session();
+  ASSERT_TRUE(session) << session.error().message;
+  for (const char* job : {"opaline-capture", "opaline-reconstruct"}) {
+    const auto done = bed_->complete(job, *session);
+    ASSERT_TRUE(done) << done.error().message;
+  }
+  const auto path = *session / "material.vdb";
+  const auto material = read_material(path);
+  ASSERT_TRUE(material) << material.error().message;
+  EXPECT_EQ(material->block.cell_count(), 8U * 8U * 4U);
+  for (const ChannelCoefficients& channel : material->channels) {
+    EXPECT_TRUE(std::ranges::all_of(channel.absorption, [](double a) { return a > 0.0; }));
+    EXPECT_TRUE(std::ranges::all_of(channel.reduced_scattering, [](double s) { return s > 0.0; }));
+  }
+  Process print({"/usr/bin/vdb_print", path.string()}, {}, in_bed("vdb_print.out"));
+  EXPECT_EQ(print.wait(), 0);
+  for (const char* grid : {"absorption", "reduced_scattering", "diffusion"}) {
+    EXPECT_THAT(print.output(), HasSubstr(grid));
+  }
+}
+
+}  // namespace
+}  // namespace opaline::faults
