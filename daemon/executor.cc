@@ -28,6 +28,9 @@ class LocalProcess final : public JobProcess {
     exit_ = ended > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return exit_;
   }
+  std::optional<pid_t> pid() const override {
+    return exit_ ? std::nullopt : std::optional<pid_t>(pid_);
+  }
 
  private:
   pid_t pid_;

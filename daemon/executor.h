@@ -23,6 +23,8 @@ class JobProcess {
   virtual ~JobProcess() = default;
   /// The exit status once it has ended, 128 + n when signal n ended it.
   virtual std::optional<int> poll_exit() = 0;
+  /// Its number, ours to signal until poll_exit() has seen the end; nothing when it runs elsewhere.
+  virtual std::optional<pid_t> pid() const = 0;
 };
 
 /// Where jobs run.

@@ -6,13 +6,11 @@
 #include "base/lock.h"
 #include "base/log.h"
 #include "daemon/cancel_wish.h"
-#include "daemon/jobs/control_client.h"
 
 namespace opaline::daemon {
 namespace {
 
 constexpr std::chrono::seconds kRetryBusyAfter{1};
-constexpr std::chrono::milliseconds kControlDeadline{300};
 constexpr int kExitBusy = 4;  // JobExit::kBusy
 
 }  // namespace
@@ -48,7 +46,7 @@ Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
   if (decision->action == Action::kGiveUp || decision->action == Action::kCloseCancel) {
     if (decision = look(); !decision) return decision.error();
   }
-  if (decision->state != SessionState::kCancelling) cancel_sent_ = false;
+  if (decision->state != SessionState::kCancelling) stopper_.reset();
   SessionSnapshot snapshot = make_snapshot(session_, history_, *decision);
   if (decision->action == Action::kStart && child_ != nullptr) {
     snapshot.state = SessionState::kRunning;
@@ -63,7 +61,7 @@ Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
 Result<void> SessionSupervisor::act(const Decision& decision, BusyStations& stations) {
   switch (decision.action) {
     case Action::kNone:
-      if (decision.state == SessionState::kCancelling) ask_to_stop();
+      if (decision.state == SessionState::kCancelling) make_job_stop();
       return ok();
     case Action::kStart:
       waiting_ = !station_is_free(decision.stage, stations);
@@ -129,11 +127,9 @@ void SessionSupervisor::note_exit(int exit) {
   }
 }
 
-void SessionSupervisor::ask_to_stop() {
-  if (cancel_sent_ || history_.cancel_requested()) return;
-  const auto answer = ask_job(session_.control_socket(), {{"command", "cancel"}}, kControlDeadline);
-  cancel_sent_ = answer.has_value();  // a job that only begins has no socket yet: asked again
-  if (!answer) log::debug("session {}: {}", session_.id(), answer.error().message);
+void SessionSupervisor::make_job_stop() {
+  const auto child = child_ != nullptr ? child_->pid() : std::nullopt;
+  stopper_.step(session_, child, history_.cancel_requested());
 }
 
 Result<void> SessionSupervisor::resume() {

@@ -13,6 +13,7 @@
 #include "base/session_directory.h"
 #include "daemon/event_follower.h"
 #include "daemon/executor.h"
+#include "daemon/job_stopper.h"
 #include "daemon/session_snapshot.h"
 
 namespace opaline::daemon {
@@ -25,7 +26,7 @@ using BusyStations = std::set<std::filesystem::path>;
 ///   queued -> waiting for station -> running (stage by stage) -> succeeded | failed | cancelled
 ///
 /// Everything it must remember is in the session's directory, so another supervisor goes on where this one was
-/// dropped; jobs outlive it. Once a cancel is wished (daemon/cancel_wish.h) the job is asked to stop,
+/// dropped; jobs outlive it. Once a cancel is wished (daemon/cancel_wish.h) the job is made to stop,
 /// and no other is started. A stage that dies is started again, at most kFruitlessRuns times in a
 /// row without a fact logged; one that fails is not.
 /// Threads: one at a time.
@@ -40,11 +41,13 @@ class SessionSupervisor {
   /// `station_lock` is empty when the session needs no station.
   SessionSupervisor(SessionDirectory session,
                     std::filesystem::path station_lock,
-                    Neighbours neighbours)
+                    Neighbours neighbours,
+                    const JobStopper::Options& stopping = {})
       : session_(std::move(session)),
         station_lock_(std::move(station_lock)),
         neighbours_(neighbours),
-        follower_(session_.events()) {}
+        follower_(session_.events()),
+        stopper_(stopping, neighbours_.clock) {}
 
   /// Looks once, does what is due, and says how things are. To be called a few times a second.
   /// Errors: the log cannot be read, or a decision cannot be logged; later calls try again.
@@ -60,7 +63,7 @@ class SessionSupervisor {
   Result<void> act(const Decision& decision, BusyStations& stations);
   Result<void> start(std::size_t stage);
   void note_exit(int exit);
-  void ask_to_stop();
+  void make_job_stop();
   bool station_is_free(std::size_t stage, const BusyStations& stations) const;
   Result<void> log_under_lock(std::string_view type,
                               const nlohmann::json& data,
@@ -70,6 +73,7 @@ class SessionSupervisor {
   std::filesystem::path station_lock_;
   Neighbours neighbours_;  // outlive us
   EventFollower follower_;
+  JobStopper stopper_;
   SessionHistory history_;
   std::unique_ptr<JobProcess> child_;
   std::optional<std::size_t> child_stage_;
@@ -77,7 +81,6 @@ class SessionSupervisor {
   std::string start_failure_;  // why the stage cannot be started at all
   std::optional<std::chrono::nanoseconds> retry_after_;
   bool waiting_ = false;
-  bool cancel_sent_ = false;
 };
 
 }  // namespace opaline::daemon

@@ -18,7 +18,9 @@ void Supervisor::add(SessionDirectory session) {
   const std::filesystem::path lock = hooks_.station_lock(session);
   const std::string id = session.id();
   const std::lock_guard guard(mutex_);
-  active_.try_emplace(id, Entry{SessionSupervisor(std::move(session), lock, neighbours_), {}});
+  const auto [it, is_new] = active_.try_emplace(
+      id, Entry{SessionSupervisor(std::move(session), lock, neighbours_, options_.stopping), {}});
+  it->second.added_again = !is_new;
   woken_ = true;
   wake_.notify_all();
 }
@@ -37,11 +39,23 @@ void Supervisor::run(const std::stop_token& stop) {
   }
 }
 
-void Supervisor::step_all() {
+std::vector<Supervisor::Entry*> Supervisor::entries() {
   const std::lock_guard guard(mutex_);
+  std::vector<Entry*> result;
+  for (auto& [id, entry] : active_) {
+    entry.added_again = false;
+    result.push_back(&entry);
+  }
+  return result;
+}
+
+// One that was over and is added again at that moment has perhaps been resumed: it stays.
+void Supervisor::step_all() {
   BusyStations stations;
-  for (auto it = active_.begin(); it != active_.end();) {
-    it = step_one(it->second, stations) ? std::next(it) : active_.erase(it);
+  for (Entry* entry : entries()) {
+    if (step_one(*entry, stations)) continue;
+    const std::lock_guard guard(mutex_);
+    if (!entry->added_again) active_.erase(entry->supervisor.session().id());
   }
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "daemon/session_supervisor.h"
 
@@ -25,6 +26,7 @@ class Supervisor {
   };
   struct Options {
     std::chrono::milliseconds period{100};  ///< between two looks at every session
+    JobStopper::Options stopping;           ///< of jobs whose session is cancelled
   };
 
   Supervisor(SessionSupervisor::Neighbours neighbours, Hooks hooks, const Options& options);
@@ -40,10 +42,12 @@ class Supervisor {
   struct Entry {
     SessionSupervisor supervisor;
     std::string last_error;
+    bool added_again = false;  // guarded by mutex_; since it was last looked at
   };
 
   void run(const std::stop_token& stop);
   void step_all();
+  std::vector<Entry*> entries();
   bool step_one(Entry& entry, BusyStations& stations);  // false when the session is over
   void publish(const SessionSnapshot& snapshot);
 
@@ -52,8 +56,10 @@ class Supervisor {
   Options options_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
-  bool woken_ = false;                   // guarded by mutex_
-  std::map<std::string, Entry> active_;  // guarded by mutex_; ids begin with the time
+  bool woken_ = false;  // guarded by mutex_
+  // guarded by mutex_, which no step holds: one may wait for a job. Only thread_ takes entries out
+  // or uses them. Ids begin with the time.
+  std::map<std::string, Entry> active_;
   mutable std::mutex snapshots_mutex_;
   std::map<std::string, SessionSnapshot> snapshots_;  // guarded by snapshots_mutex_
   std::jthread thread_;                               // last: joins first

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 
 #include "base/lock.h"
 #include "daemon/cancel_wish.h"
+#include "daemon/jobs/control_client.h"
 #include "daemon/jobs/station_lock.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
@@ -15,6 +17,7 @@
 namespace opaline::daemon {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::eventually;
 using ::testing::HasSubstr;
 
@@ -40,7 +43,9 @@ class Supervision : public ::testing::Test {
         neighbours_,
         Supervisor::Hooks{[](const SessionDirectory&) { return station_lock_path("bench"); },
                           [](const SessionSnapshot&) {}},
-        Supervisor::Options{std::chrono::milliseconds(5)});
+        Supervisor::Options{
+            std::chrono::milliseconds(5),
+            {.period = 10ms, .terminate_after = terminate_after_, .kill_after = kill_after_}});
   }
   static void cancel(Supervisor& supervisor, const SessionDirectory& session) {
     EXPECT_TRUE(wish_cancel(system_files(), session));
@@ -54,10 +59,21 @@ class Supervision : public ::testing::Test {
     return eventually([&] { return state_of(session) == state; });
   }
 
+  // The number of the job that holds; 0 before it answers.
+  static pid_t holder_of(const SessionDirectory& session) {
+    const auto status = ask_job(session.control_socket(), {{"command", "status"}});
+    return status && status->at("progress").is_object() ? status->at("pid").get<pid_t>() : 0;
+  }
+  static bool holds(const SessionDirectory& session) {
+    return eventually([&] { return holder_of(session) != 0; });
+  }
+
   testing::TemporaryDirectory root_;
   std::filesystem::path switches_ = root_.path() / "switches";
   LocalExecutor executor_{std::getenv("OPALINE_FAKES")};
   SystemClock clock_;
+  std::chrono::nanoseconds terminate_after_ = 1min;
+  std::chrono::nanoseconds kill_after_ = 2min;
   SessionSupervisor::Neighbours neighbours_{executor_, system_files(), clock_};
 };
 
@@ -161,6 +177,62 @@ TEST_F(Supervision, CancelsASessionThatWaits) {
   EXPECT_TRUE(becomes(session, SessionState::kCancelled));
 }
 
+TEST_F(Supervision, KillsAJobThatDoesNotListen) {
+  turn_on("capture.hold");
+  turn_on("capture.deaf");
+  terminate_after_ = 50ms;
+  kill_after_ = 150ms;
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(becomes(session, SessionState::kRunning));
+
+  cancel(*supervisor, session);
+
+  EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+}
+
+TEST_F(Supervision, TerminatesAJobWhoseSocketIsGone) {
+  turn_on("capture.hold");
+  terminate_after_ = 50ms;
+  const SessionDirectory session = make_session("a");
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  ASSERT_TRUE(eventually([&] { return std::filesystem::remove(session.control_socket()); }));
+
+  cancel(*supervisor, session);
+
+  ASSERT_TRUE(becomes(session, SessionState::kCancelled));
+  EXPECT_EQ(read_snapshot(session)->stages[0].state, StageState::kInterrupted);
+}
+
+TEST_F(Supervision, KillsAStoppedJobOfAnotherSupervisorWhileOthersGoOn) {
+  turn_on("capture.hold");
+  const SessionDirectory session = make_session("a");
+  {
+    const auto supervisor = make_supervisor();
+    supervisor->add(session);
+    ASSERT_TRUE(holds(session));
+  }
+  const pid_t job = holder_of(session);
+  ASSERT_GT(job, 0);
+  ASSERT_EQ(::kill(job, SIGSTOP), 0);
+  terminate_after_ = 200ms;
+  kill_after_ = 500ms;
+  const auto supervisor = make_supervisor();
+  supervisor->add(session);
+  cancel(*supervisor, session);
+
+  const SessionDirectory other = make_session("b");
+  const auto before = clock_.now();
+  supervisor->add(other);  // does not wait for the one that hangs
+  EXPECT_LT(clock_.now() - before, 200ms);
+
+  EXPECT_TRUE(becomes(session, SessionState::kCancelled));
+  turn_off("capture.hold");
+  EXPECT_TRUE(becomes(other, SessionState::kSucceeded));
+}
+
 TEST_F(Supervision, RemembersAWishToCancelThatNoSupervisorSaw) {
   turn_on("capture.hold");
   const SessionDirectory session = make_session("a");
@@ -185,7 +257,8 @@ TEST_F(Supervision, ForgetsTheWishToCancelWhenResumedAtOnce) {
     BusyStations stations;
     return supervisor.step(stations);
   };
-  ASSERT_TRUE(eventually([&] { return step() && state_of(session) == SessionState::kRunning; }));
+  ASSERT_TRUE(step());
+  ASSERT_TRUE(holds(session));
   ASSERT_TRUE(wish_cancel(system_files(), session));
   ASSERT_TRUE(step());  // asks; the job ends before the next look
   ASSERT_TRUE(becomes(session, SessionState::kCancelled));

@@ -1,6 +1,7 @@
 // A stage that does nothing but behave, over the same frame as the real ones. FAKE_STAGE is its name; files in
 // the directory that OPALINE_FAKE_DIR names say how it behaves:
 //   STAGE.hold  works (progress, a fact at the start) while the file exists, and stops when asked
+//   STAGE.deaf  while holding, does not stop when asked
 //   STAGE.die   a number: kills itself with SIGKILL that many times, after one fact if STAGE.works exists
 //   STAGE.fail  fails with the file's text
 // The capture stage holds the station that OPALINE_FAKE_STATION names.
@@ -51,7 +52,10 @@ Result<void> hold(daemon::JobContext& context) {
   SystemClock clock;
   for (int i = 0; is_on("hold"); ++i) {
     context.events.progress({"holding", 0.5, 1.5, {{"turn", i}}});
-    if (!clock.sleep(std::chrono::milliseconds(2), context.stop)) return cancelled("asked to stop");
+    const bool deaf = is_on("deaf");
+    if (!clock.sleep(std::chrono::milliseconds(2), deaf ? std::stop_token() : context.stop)) {
+      return cancelled("asked to stop");
+    }
   }
   return ok();
 }
