@@ -40,7 +40,7 @@ Result<Decision> SessionSupervisor::decide_now(bool alive) {
 Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
   Result<Decision> decision = look();
   if (!decision) return decision.error();
-  waiting_ = false;
+  waits_for_.clear();
   if (auto acted = act(*decision, stations); !acted) return acted.error();
   if (child_ != nullptr && kStages[*child_stage_] == kStationStage) stations.insert(station_lock_);
   if (decision->action == Action::kGiveUp || decision->action == Action::kCloseCancel) {
@@ -51,9 +51,9 @@ Result<SessionSnapshot> SessionSupervisor::step(BusyStations& stations) {
   if (decision->action == Action::kStart && child_ != nullptr) {
     snapshot.state = SessionState::kRunning;
   }
-  if (waiting_) {
+  if (!waits_for_.empty()) {
     snapshot.state = SessionState::kWaiting;
-    snapshot.message = "the station is in use by another session";
+    snapshot.message = waits_for_;
   }
   return snapshot;
 }
@@ -64,8 +64,8 @@ Result<void> SessionSupervisor::act(const Decision& decision, BusyStations& stat
       if (decision.state == SessionState::kCancelling) make_job_stop();
       return ok();
     case Action::kStart:
-      waiting_ = !station_is_free(decision.stage, stations);
-      return waiting_ ? ok() : start(decision.stage);
+      waits_for_ = station_obstacle(decision.stage, stations);
+      return waits_for_.empty() ? start(decision.stage) : ok();
     case Action::kGiveUp: {
       const std::string message =
           !start_failure_.empty()
@@ -89,11 +89,15 @@ Result<void> SessionSupervisor::act(const Decision& decision, BusyStations& stat
   return ok();
 }
 
-bool SessionSupervisor::station_is_free(std::size_t stage, const BusyStations& stations) const {
-  if (kStages[stage] != kStationStage || station_lock_.empty()) return true;
-  if (retry_after_ && neighbours_.clock.now() < *retry_after_) return false;
+// Empty when the stage can have its station.
+std::string SessionSupervisor::station_obstacle(std::size_t stage,
+                                                const BusyStations& stations) const {
+  static constexpr const char* kInUse = "the station is in use by another session";
+  if (kStages[stage] != kStationStage || station_lock_.empty()) return {};
+  if (retry_after_ && neighbours_.clock.now() < *retry_after_) return kInUse;
   const Result<bool> held = FileLock::is_held(station_lock_);
-  return !stations.contains(station_lock_) && held && !*held;
+  if (!held) return held.error().message;
+  return *held || stations.contains(station_lock_) ? kInUse : "";
 }
 
 Result<void> SessionSupervisor::start(std::size_t stage) {

@@ -64,7 +64,7 @@ class SessionSupervisor {
   Result<void> start(std::size_t stage);
   void note_exit(int exit);
   void make_job_stop();
-  bool station_is_free(std::size_t stage, const BusyStations& stations) const;
+  std::string station_obstacle(std::size_t stage, const BusyStations& stations) const;
   Result<void> log_under_lock(std::string_view type,
                               const nlohmann::json& data,
                               const std::function<Result<bool>(const Decision&)>& still_due);
@@ -80,7 +80,7 @@ class SessionSupervisor {
   std::uint64_t seq_at_start_ = 0;
   std::string start_failure_;  // why the stage cannot be started at all
   std::optional<std::chrono::nanoseconds> retry_after_;
-  bool waiting_ = false;
+  std::string waits_for_;  // why the stage cannot be started yet
 };
 
 }  // namespace opaline::daemon

@@ -152,6 +152,18 @@ TEST_F(Supervision, QueuesTwoSessionsOnOneStation) {
   EXPECT_TRUE(becomes(second, SessionState::kSucceeded));
 }
 
+TEST_F(Supervision, SaysWhyAStationsLockCannotBeLookedAt) {
+  std::ofstream(root_.path() / "file") << "no directory";
+  SessionSupervisor supervisor(make_session("a"), root_.path() / "file" / "lock", neighbours_);
+  BusyStations stations;
+
+  const auto snapshot = supervisor.step(stations);
+
+  ASSERT_TRUE(snapshot);
+  EXPECT_EQ(snapshot->state, SessionState::kWaiting);
+  EXPECT_THAT(snapshot->message, HasSubstr("Not a directory"));
+}
+
 TEST_F(Supervision, CancelsARunningSession) {
   turn_on("capture.hold");
   const SessionDirectory session = make_session("a");
