@@ -13,11 +13,6 @@ namespace fs = std::filesystem;
 
 constexpr int kListLimit = 1000;
 
-bool is_over_named(std::string_view state) {
-  return state == to_string(SessionState::kSucceeded) ||
-         state == to_string(SessionState::kFailed) || state == to_string(SessionState::kCancelled);
-}
-
 // When a session was made stands at the front of its id.
 std::string created_of(const std::string& id) {
   if (id.size() < 15) return id;
@@ -95,10 +90,11 @@ void Station::forget_missing() {
   }
 }
 
-// A session that is over needs no reading of its log when the catalogue knows it.
+// One that has succeeded stays so, and its log need not be read. What failed or was cancelled may have
+// been resumed without our knowing: by hand, or by us just before we were killed.
 void Station::take_up(const fs::path& directory) {
   const auto known = catalogue_->find(directory.filename().string());
-  if (known && *known && is_over_named((*known)->state)) return;
+  if (known && *known && (*known)->state == to_string(SessionState::kSucceeded)) return;
   const Result<SessionDirectory> session = SessionDirectory::open(directory);
   const Result<SessionSnapshot> snapshot =
       session ? read_snapshot(*session) : Result<SessionSnapshot>(session.error());

@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include "base/event_log.h"
 #include "base/lock.h"
+#include "daemon/jobs/control_client.h"
 #include "tests/api/opalined_fixture.h"
 
 namespace opaline::testing {
@@ -102,6 +104,44 @@ TEST_F(Opalined, ResumesWhatFailed) {
 
   EXPECT_TRUE(becomes(id, "succeeded"));
   EXPECT_EQ(ask("POST", "/v1/sessions/" + id + "/resume").status, 409);
+}
+
+TEST_F(Opalined, TakesUpWhatWasResumedWithoutItsKnowing) {
+  turn_on("reconstruct.fail", "no memory");
+  start();
+  const std::string id = create();
+  ASSERT_TRUE(becomes(id, "failed"));
+  ASSERT_TRUE(eventually([&] {  // in the catalogue, too
+    return ask("GET", "/v1/sessions").json()["sessions"][0]["state"] == "failed";
+  }));
+  daemon_->kill(SIGKILL);
+  daemon_->wait();
+  turn_off("reconstruct.fail");
+  const auto log = EventLog::open(system_files(), sessions_ / id / "events.jsonl");
+  ASSERT_TRUE(log && (*log)->append("session.resumed", nlohmann::json::object()));
+
+  start();
+
+  EXPECT_TRUE(becomes(id, "succeeded"));
+}
+
+TEST_F(Opalined, StartsAgainAJobThatASignalInterrupted) {
+  turn_on("capture.hold");
+  start();
+  const std::string id = create();
+  const auto job = [&] {
+    const auto status = daemon::ask_job(sessions_ / id / "control.sock", {{"command", "status"}});
+    return status && status->at("progress").is_object() ? status->at("pid").get<pid_t>() : 0;
+  };
+  for (int i = 0; i < 4; ++i) {  // more often than a stage may die
+    pid_t pid = 0;
+    ASSERT_TRUE(eventually([&] { return (pid = job()) != 0; }));
+    ASSERT_EQ(::kill(pid, SIGTERM), 0);
+    ASSERT_TRUE(eventually([&] { return job() != pid; }));
+  }
+  turn_off("capture.hold");
+
+  EXPECT_TRUE(becomes(id, "succeeded"));
 }
 
 TEST_F(Opalined, QueuesASecondSessionOfTheSameStation) {
