@@ -86,6 +86,19 @@ double Vignetting::at(double r_squared) const {
   return 1.0 + r_squared * (c[0] + r_squared * (c[1] + r_squared * c[2]));
 }
 
+double Vignetting::least() const {
+  double least = std::min(at(0.0), at(1.0));
+  // Where its slope in r^2 is 0:  c0 + 2 c1 s + 3 c2 s^2 = 0.
+  const double a = 3.0 * coefficients[2];
+  const double b = coefficients[1];
+  const double c = coefficients[0];
+  const double root = std::sqrt(std::max(0.0, b * b - a * c));
+  for (const double s : {(-b + root) / a, (-b - root) / a, -0.5 * c / b}) {
+    if (s > 0.0 && s < 1.0) least = std::min(least, at(s));  // false for what is not finite
+  }
+  return least;
+}
+
 Result<void> validate(const StationCalibration& calibration) {
   const CameraCalibration& c = calibration.camera;
   const ProjectorCalibration& p = calibration.projector;
@@ -99,10 +112,10 @@ Result<void> validate(const StationCalibration& calibration) {
       {c.gain_electrons_per_code > 0.0, "camera.gain", c.gain_electrons_per_code, "> 0"},
       {c.full_well_electrons >= 0.0, "camera.full_well", c.full_well_electrons, ">= 0"},
       {c.read_noise_electrons >= 0.0, "camera.read_noise", c.read_noise_electrons, ">= 0"},
-      {c.vignetting.at(1.0) > 0.0,
+      {c.vignetting.least() > 0.0,
        "camera.vignetting",
-       c.vignetting.at(1.0),
-       "light in the corner"},
+       c.vignetting.least(),
+       "light all over the picture"},
       {positive(c.sensitivity), "camera.sensitivity", c.sensitivity[0], "> 0 in each channel"},
       {p.width > 0 && p.height > 0, "projector.width", 1.0 * p.width, "a size > 0"},
       {p.mm_per_pixel > 0.0, "projector.mm_per_pixel", p.mm_per_pixel, "> 0"},
@@ -111,10 +124,10 @@ Result<void> validate(const StationCalibration& calibration) {
        "projector.black_level",
        p.black_level,
        "0 or more, below 1"},
-      {p.vignetting.at(1.0) > 0.0,
+      {p.vignetting.least() > 0.0,
        "projector.vignetting",
-       p.vignetting.at(1.0),
-       "light in the corner"},
+       p.vignetting.least(),
+       "light all over the picture"},
       {positive(p.peak_irradiance),
        "projector.peak_irradiance",
        p.peak_irradiance[0],

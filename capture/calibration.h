@@ -27,6 +27,7 @@ struct ResponseCurve {
 struct Vignetting {
   std::array<double, 3> coefficients{};
   double at(double r_squared) const;
+  double least() const;  ///< of it in the picture, 0 <= r <= 1
 };
 
 /// What the capture believes of its camera. A pixel sees

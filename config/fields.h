@@ -30,11 +30,15 @@ struct Range {
   double min = std::numeric_limits<double>::lowest();
   double max = std::numeric_limits<double>::max();
   bool min_excluded = false;
+  bool max_excluded = false;
 
   static Range at_least(double value) { return {.min = value}; }
   static Range above(double value) { return {.min = value, .min_excluded = true}; }
   static Range between(double low, double high) { return {.min = low, .max = high}; }
 };
+
+/// What a duration may be, in seconds, unless a key says otherwise: nanoseconds hold it.
+inline constexpr Range kDurations{.min = 1e-9, .max = 1e5};
 
 /// Visits the keys of one TOML table in order. Reading fills the values in and writing prints them
 /// by the same visit, so that what is read, written and explained cannot differ.
@@ -92,7 +96,7 @@ class Fields {
   template <class Rep, class Period>
   void duration(const Key& key,
                 std::chrono::duration<Rep, Period>& value,
-                Range seconds = Range::above(0.0)) {
+                Range seconds = kDurations) {
     using Duration = std::chrono::duration<Rep, Period>;
     const double before = std::chrono::duration<double>(value).count();
     double after = before;

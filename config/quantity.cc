@@ -139,14 +139,20 @@ std::string describe(const Range& range, Unit unit) {
   const std::string min = format_quantity(range.min, unit);
   const std::string max = format_quantity(range.max, unit);
   const bool is_limited = range.max != all.max;
-  if (range.min == all.min) return is_limited ? "at most " + max : "";
-  if (!range.min_excluded)
-    return is_limited ? fmt::format("{} to {}", min, max) : "at least " + min;
-  return fmt::format("more than {}{}", min, is_limited ? ", at most " + max : "");
+  const std::string below = (range.max_excluded ? "less than " : "at most ") + max;
+  if (range.min == all.min) return is_limited ? below : "";
+  if (is_limited && !range.min_excluded && !range.max_excluded) {
+    return fmt::format("{} to {}", min, max);
+  }
+  return fmt::format("{} {}{}",
+                     range.min_excluded ? "more than" : "at least",
+                     min,
+                     is_limited ? ", " + below : "");
 }
 
 bool contains(const Range& range, double value) {
-  return (range.min_excluded ? value > range.min : value >= range.min) && value <= range.max;
+  return (range.min_excluded ? value > range.min : value >= range.min) &&
+         (range.max_excluded ? value < range.max : value <= range.max);
 }
 
 std::optional<std::string_view> nearest(std::string_view word,

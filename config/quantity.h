@@ -18,7 +18,7 @@ std::string format_quantity(double value, Unit unit);
 /// What a quantity looks like, for messages: `a length with a unit, such as "24 mm"`.
 std::string_view describe(Unit unit);
 
-/// "more than 0", "at least 1", "0 to 1"; empty when everything is allowed.
+/// "more than 0", "at least 1", "0 to 1", "at least 0, less than 1"; empty when everything is allowed.
 std::string describe(const Range& range, Unit unit);
 bool contains(const Range& range, double value);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -71,8 +72,9 @@ void visit_projection(Fields& fields, Projector& p) {
                 p.offset_x_px);
   fields.number({"offset_y_px", "pixel at which its first row begins"}, p.offset_y_px);
   fields.number({"gamma", "light = (code / 255)^gamma"}, p.gamma, kGamma);
-  fields.number(
-      {"black_level", "light at code 0, share of the peak"}, p.black_level, Range::between(0, 1));
+  fields.number({"black_level", "light at code 0, share of the peak"},
+                p.black_level,
+                Range{.min = 0, .max = 1, .max_excluded = true});
   fields.numbers({"peak_irradiance_w_per_mm2", "red, green, blue, at code 255 in the middle"},
                  p.peak_irradiance,
                  kAbove0);
@@ -81,14 +83,17 @@ void visit_projection(Fields& fields, Projector& p) {
 constexpr Key kVignetting{"vignetting",
                           "1 + v0 r^2 + v1 r^4 + v2 r^6, r = 1 in the picture's corners"};
 
-/// Vignetting at r = 1.
-double corner(const std::array<double, 3>& v) { return 1.0 + v[0] + v[1] + v[2]; }
+void visit_vignetting(Fields& fields, std::array<double, 3>& v) {
+  fields.numbers(kVignetting, v);
+  fields.check(capture::Vignetting{v}.least() > 0.0,
+               "vignetting",
+               "expected light all over the picture, 0 <= r <= 1");
+}
 
 void visit_sim_camera(Fields& fields, sim::CameraOptics& c) {
   visit_camera_model(fields, c.model, false);
   fields.number({"psf_sigma_px", "Gaussian blur; 0: none"}, c.psf_sigma_px, Range::between(0, 20));
-  fields.numbers(kVignetting, c.vignetting);
-  fields.check(corner(c.vignetting) > 0.0, "vignetting", "expected light in the corners");
+  visit_vignetting(fields, c.vignetting);
   fields.numbers(
       {"sensitivity", "red, green, blue: electrons per (W/(mm^2 sr) s)"}, c.sensitivity, kAbove0);
   fields.number({"full_well_electrons", "where a pixel clips"}, c.full_well_electrons, kAbove0);
@@ -107,9 +112,7 @@ void visit_sim_camera(Fields& fields, sim::CameraOptics& c) {
   fields.number(
       {"exposure_error", "relative, of the shutter"}, c.exposure_error, Range::between(0, 0.1));
   fields.duration({"shortest_exposure", ""}, c.shortest_exposure);
-  fields.duration({"longest_exposure", ""},
-                  c.longest_exposure,
-                  Range{.min = 0, .max = 3600, .min_excluded = true});
+  fields.duration({"longest_exposure", ""}, c.longest_exposure, Range::between(1e-9, 3600));
   fields.check(c.longest_exposure >= c.shortest_exposure,
                "longest_exposure",
                "expected at least shortest_exposure");
@@ -117,8 +120,7 @@ void visit_sim_camera(Fields& fields, sim::CameraOptics& c) {
 
 void visit_sim_projector(Fields& fields, sim::ProjectorOptics& p) {
   visit_projection(fields, p);
-  fields.numbers(kVignetting, p.vignetting);
-  fields.check(corner(p.vignetting) > 0.0, "vignetting", "expected light in the corners");
+  visit_vignetting(fields, p.vignetting);
   fields.duration({"latency", "from the picture to its light"}, p.latency, Range::between(0, 1));
   fields.duration({"wheel_turn", "of the colour wheel: exposures are whole multiples"},
                   p.wheel_turn,
@@ -230,16 +232,30 @@ void visit_response(Fields& fields, capture::ResponseCurve& response) {
                "expected values that rise from 0 to 1");
 }
 
-void visit_hot_pixels(Fields& fields, std::vector<std::pair<int, int>>& pixels) {
+void visit_hot_pixels(Fields& fields, capture::CameraCalibration& camera) {
+  std::vector<std::pair<int, int>>& pixels = camera.hot_pixels;
   std::vector<std::int64_t> flat;
   for (const auto& [x, y] : pixels) flat.insert(flat.end(), {x, y});
-  fields.integers(
-      {"hot_pixels", "known ones, x, y, x, y, ...; others are found"}, flat, 0, kPictureSize);
+  fields.integers({"hot_pixels", "known ones, x, y, x, y, ... from 0; others are found"},
+                  flat,
+                  0,
+                  Range::between(0, kPictureSize.max - 1));
   fields.check(flat.size() % 2 == 0, "hot_pixels", "expected pairs x, y");
   pixels.clear();
   for (std::size_t i = 0; i + 1 < flat.size(); i += 2) {
     pixels.emplace_back(static_cast<int>(flat[i]), static_cast<int>(flat[i + 1]));
   }
+  const auto outside = std::ranges::find_if(pixels, [&](const auto& pixel) {
+    return pixel.first >= camera.model.width || pixel.second >= camera.model.height;
+  });
+  if (outside == pixels.end()) return;
+  fields.check(false,
+               "hot_pixels",
+               fmt::format("there is no pixel {}, {}; expected pixels of a picture of {} x {}",
+                           outside->first,
+                           outside->second,
+                           camera.model.width,
+                           camera.model.height));
 }
 
 void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool required) {
@@ -253,12 +269,10 @@ void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool
                 c.full_well_electrons,
                 kAtLeast0);
   fields.number({"read_noise_electrons", "standard deviation"}, c.read_noise_electrons, kAtLeast0);
-  fields.numbers(kVignetting, c.vignetting.coefficients);
-  fields.check(
-      corner(c.vignetting.coefficients) > 0.0, "vignetting", "expected light in the corners");
+  visit_vignetting(fields, c.vignetting.coefficients);
   fields.numbers(
       {"sensitivity", "red, green, blue: electrons per (W/(mm^2 sr) s)"}, c.sensitivity, kAbove0);
-  visit_hot_pixels(fields, c.hot_pixels);
+  visit_hot_pixels(fields, c);
 }
 
 void visit_calibration(Fields& fields, RigConfig& rig) {
@@ -269,10 +283,7 @@ void visit_calibration(Fields& fields, RigConfig& rig) {
                [&](Fields& f) {
                  capture::ProjectorCalibration& p = rig.calibration.projector;
                  visit_projection(f, p);
-                 f.numbers(kVignetting, p.vignetting.coefficients);
-                 f.check(corner(p.vignetting.coefficients) > 0.0,
-                         "vignetting",
-                         "expected light in the corners");
+                 visit_vignetting(f, p.vignetting.coefficients);
                });
 }
 
@@ -294,9 +305,12 @@ void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
   fields.table({"replay", "Photographs instead of devices."}, [&](Fields& f) {
     const bool used = rig.camera == Driver::kReplay || rig.projector == Driver::kReplay;
     visit_path(f,
-               {"folder", "with its index, used by driver = \"replay\"", used},
+               {"folder", "with its index, used by driver = \"replay\""},
                rig.replay_folder,
                check_files);
+    f.check(!used || !rig.replay_folder.empty(),
+            "folder",
+            "expected the folder of the photographs that driver = \"replay\" stands for");
   });
   fields.table({"sim", "The simulated station, used by driver = \"sim\"."},
                [&](Fields& f) { visit_sim(f, rig.sim, check_files); });

@@ -60,7 +60,7 @@ void visit_capture(Fields& fields, capture::CaptureOptions& c) {
                 Range{.min = 0.0, .max = 1.0, .min_excluded = true});
   fields.length_mm({"direct_light_margin", "masked around a lit region on the seen face"},
                    c.direct_light_margin_mm,
-                   Range::at_least(0));
+                   Range::between(0, 1000));
   fields.number({"usable_share", "of the regions; fewer usable ones end the session"},
                 c.usable_share,
                 Range::between(0, 1));

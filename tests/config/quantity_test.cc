@@ -40,6 +40,10 @@ TEST(Quantity, SaysWhatARangeAllows) {
   EXPECT_EQ(describe(Range::between(0, 1), Unit::kPlain), "0 to 1");
   EXPECT_EQ(describe(Range{.min = 1, .max = 16, .min_excluded = true}, Unit::kPlain),
             "more than 1, at most 16");
+  constexpr Range kBelowOne{.min = 0, .max = 1, .max_excluded = true};
+  EXPECT_EQ(describe(kBelowOne, Unit::kPlain), "at least 0, less than 1");
+  EXPECT_TRUE(contains(kBelowOne, 0.0));
+  EXPECT_FALSE(contains(kBelowOne, 1.0));
 }
 
 TEST(Quantity, FindsTheNameThatWasMeant) {

@@ -106,7 +106,7 @@ TEST_F(SessionConfigTest, FindsTenMistakesInOneGoEachAtItsPlace) {
                   "10:1: unknown key \"region\" in [capture]; did you mean \"regions\"?",
                   "12:13: longest is \"8 mm\"; expected a time with its unit, such as \"33 ms\" or "
                   "\"1/30 s\", "
-                  "more than 0 s",
+                  "1 ns to 100000 s",
                   "13:9: ratio is 0.8; expected a number, more than 1, at most 16",
                   "14:2: unknown key \"reconstuction\"; did you mean \"reconstruction\"?",
                   "2:10: driver is \"webcam\"; expected one of \"sim\", \"replay\"",
@@ -115,6 +115,45 @@ TEST_F(SessionConfigTest, FindsTenMistakesInOneGoEachAtItsPlace) {
   ASSERT_FALSE(session);
   EXPECT_EQ(session.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(session.error().message, HasSubstr("rig.toml:5:9: width"));
+}
+
+TEST_F(SessionConfigTest, FindsTheImpossibleValuesOfARig) {
+  EXPECT_THAT(problems_of(write("rig.toml",
+                                "[projector]\n"
+                                "driver = \"replay\"\n"
+                                "[replay]\n"
+                                "folder = \"\"\n"
+                                "[sim.camera]\n"
+                                "longest_exposure = \"0.1 ns\"\n"
+                                "[sim.projector]\n"
+                                "black_level = 1\n"
+                                "[calibration.camera]\n"
+                                "hot_pixels = [0, 0, 255, 256]\n"
+                                "vignetting = [-4, 3.5, 0]\n"  // dark at r^2 = 4/7 only
+                                "[calibration.projector]\n"
+                                "black_level = 1.0\n"
+                                "vignetting = [-1, 0, 0]\n")),
+              ElementsAre(StartsWith("4:10: folder: expected the folder"),
+                          HasSubstr("6:20: longest_exposure is \"0.1 ns\""),
+                          AllOf(StartsWith("8:15: black_level is 1;"), HasSubstr("less than 1")),
+                          AllOf(StartsWith("10:14: hot_pixels: "), HasSubstr("no pixel 255, 256")),
+                          AllOf(StartsWith("11:14: vignetting: "), HasSubstr("all over")),
+                          StartsWith("13:15: black_level is 1"),
+                          StartsWith("14:14: vignetting: ")));
+}
+
+TEST_F(SessionConfigTest, FindsTheImpossibleValuesOfASession) {
+  write("rig.toml", "");
+  EXPECT_THAT(problems_of(write("session.toml",
+                                "rig = \"rig.toml\"\n"
+                                "[capture]\n"
+                                "direct_light_margin = \"2 m\"\n"
+                                "[capture.exposures]\n"
+                                "shortest = \"0.1 ns\"\n"
+                                "longest = \"1e11 s\"\n")),
+              ElementsAre(HasSubstr("direct_light_margin is \"2 m\""),
+                          AllOf(HasSubstr("shortest is \"0.1 ns\""), HasSubstr("1 ns to")),
+                          AllOf(HasSubstr("longest is \"1e11 s\""), HasSubstr("100000 s"))));
 }
 
 TEST_F(SessionConfigTest, NamesTheKeyThatNamesAMissingRigFileAndFindsTheOtherProblemsToo) {
