@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 namespace opaline::daemon {
 namespace {
@@ -29,15 +30,29 @@ std::string duration(double seconds) {
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
-// "region" beside "regions" reads "region 3/16".
+// In the order that an operator reads; what is not named here comes after.
+constexpr std::array<std::string_view, 7> kOrder{
+    "light", "region", "exposure", "channel", "iteration", "objective", "chi_squared_per_datum"};
+
+std::vector<std::string> keys_in_order(const nlohmann::json& detail) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : detail.items()) keys.push_back(key);
+  std::ranges::stable_sort(keys, {}, [](const std::string& key) {
+    return std::ranges::find(kOrder, key) - kOrder.begin();
+  });
+  return keys;
+}
+
+// "light" beside "lights" reads "light 5/24"; "region" with "region_1_2" only the latter.
 std::string details(const nlohmann::json& detail) {
   std::string line;
-  for (const auto& [key, value] : detail.items()) {
+  for (const std::string& key : keys_in_order(detail)) {
     if (key.ends_with('s') && detail.contains(key.substr(0, key.size() - 1))) continue;
-    const std::string text = figure(value);
+    const std::string text = figure(detail[key]);
     if (text.empty()) continue;
+    const std::string label = key == "chi_squared_per_datum" ? "chi2/datum" : key;
+    line += text.starts_with(key) ? "  " + text : fmt::format("  {} {}", label, text);
     const auto total = detail.find(key + "s");
-    line += fmt::format("  {} {}", key, text);
     if (total != detail.end() && total->is_number()) line += "/" + total->dump();
   }
   return line;
@@ -45,7 +60,8 @@ std::string details(const nlohmann::json& detail) {
 
 // What an operator follows besides the stages; other facts are for programs.
 bool is_notable(std::string_view type) {
-  constexpr std::array<std::string_view, 4> kEndings{".failed", ".retaken", ".warning", ".masked"};
+  constexpr std::array<std::string_view, 6> kEndings{
+      ".failed", ".retaken", ".damaged", ".unusable", ".warning", ".masked"};
   return std::ranges::any_of(kEndings, [&](std::string_view end) { return type.ends_with(end); });
 }
 
@@ -84,7 +100,13 @@ void ProgressView::on_event(const std::string& type, const nlohmann::json& data)
                     message.empty() ? "" : " (" + message + ")"));
   } else if (is_notable(type)) {
     const std::string message = text_of(data, "message");
-    say(fmt::format("{}: {} {}", stage_, type, message.empty() ? data.dump() : message));
+    const std::string region = text_of(data, "region");
+    say(fmt::format("{}: {} {}{}{}",
+                    stage_,
+                    type,
+                    region,
+                    region.empty() ? "" : ": ",
+                    message.empty() ? data.dump() : message));
   }
 }
 

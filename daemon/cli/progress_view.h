@@ -10,8 +10,9 @@
 
 namespace opaline::daemon {
 
-/// "capture: exposures  region 3/16  exposure 2/4  42 %  0:35 left", from a progress event's data:
-/// the step, every figure of its detail, the fraction and the time left.
+/// "capture  light 5/24  region_1_2  exposure 0.5 s  21 %  0:35 left", or
+/// "reconstruct: reconstruction  channel red  iteration 12  objective 0.0123  chi2/datum 1.05", from
+/// a progress event's data: the step, every figure of its detail, the fraction and the time left.
 std::string progress_line(std::string_view stage, const nlohmann::json& progress);
 
 /// A session's events for people: on a terminal one line that changes, and a lasting line for what

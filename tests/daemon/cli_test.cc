@@ -25,14 +25,33 @@ TEST(SseParser, PutsMessagesTogetherFromAnyPieces) {
   }
 }
 
-TEST(ProgressLine, ShowsStepFiguresFractionAndTimeLeft) {
+// The keys are those that capture/sequence.cc and reconstruct/inverse_solver.cc send.
+TEST(ProgressLine, ShowsACapturesLightRegionExposureAndTimeLeft) {
   const nlohmann::json progress{
-      {"step", "exposures"},
-      {"fraction", 0.42},
+      {"step", "capture"},
+      {"fraction", 0.2083},
       {"seconds_left", 95.2},
-      {"detail", {{"region", 3}, {"regions", 16}, {"objective", 0.0123456}}}};
+      {"detail", {{"light", 5}, {"lights", 24}, {"region", "region_1_2"}, {"exposure", "0.5 s"}}}};
   EXPECT_EQ(progress_line("capture", progress),
-            "capture: exposures  objective 0.01235  region 3/16  42 %  1:35 left");
+            "capture  light 5/24  region_1_2  exposure 0.5 s  21 %  1:35 left");
+}
+
+TEST(ProgressLine, ShowsAReconstructionsChannelAndObjective) {
+  const nlohmann::json progress{{"step", "reconstruction"},
+                                {"fraction", 0.4},
+                                {"detail",
+                                 {{"channel", "red"},
+                                  {"iteration", 12},
+                                  {"objective", 0.0123456},
+                                  {"chi_squared_per_datum", 1.0502}}}};
+  EXPECT_EQ(progress_line("reconstruct", progress),
+            "reconstruct: reconstruction  channel red  iteration 12  objective 0.01235  "
+            "chi2/datum 1.05  40 %");
+}
+
+TEST(ProgressLine, ShowsWhatItDoesNotKnowAfterWhatItDoes) {
+  const nlohmann::json progress{{"step", "x"}, {"detail", {{"area", 2}, {"region", "black"}}}};
+  EXPECT_EQ(progress_line("capture", progress), "capture: x  region black  area 2");
   EXPECT_EQ(progress_line("capture", nullptr), "capture");
 }
 
