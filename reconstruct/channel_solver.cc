@@ -17,6 +17,7 @@ ChannelSolver::ChannelSolver(const ChannelProblem& problem,
                              Hooks hooks)
     : problem_(problem),
       options_(options),
+      solver_(solver),
       clock_(clock),
       hooks_(std::move(hooks)),
       objective_(problem, solver, {options.tolerance, options.regularization}) {}
@@ -45,10 +46,10 @@ void ChannelSolver::record(ChannelProgress& progress) {
 }
 
 Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
-  const auto fit = fit_homogeneous(problem_, options_, objective_, stop);
+  auto fit = fit_homogeneous(problem_, options_, solver_, stop);
   if (!fit) return fit.error().in("homogeneous fit");
+  solves_before_ = fit->solves;
   ChannelProgress progress;
-  progress.report.homogeneous = *fit;
   progress.report.data_count = problem_.data_count;
   const std::size_t cells = problem_.block.cell_count();
   progress.state.x.assign(cells, std::log(fit->reduced_scattering));
@@ -56,6 +57,8 @@ Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
   auto at = objective_.evaluate(progress.state.x, stop);
   if (!at) return at.error();
   progress.state.at = *std::move(at);
+  fit->chi_squared = progress.state.at.chi_squared;
+  progress.report.homogeneous = *fit;
   record(progress);
   return progress;
 }

@@ -37,10 +37,11 @@ class ChannelSolver {
 
   const ChannelProblem& problem_;
   const InverseOptions& options_;
+  diffusion::FluenceSolver& solver_;
   const Clock& clock_;
   Hooks hooks_;
   Objective objective_;
-  long solves_before_ = 0;  // of earlier runs of this channel
+  long solves_before_ = 0;  // of the homogeneous fit and earlier runs of this channel
   double seconds_before_ = 0.0;
   std::chrono::nanoseconds start_{};
 };

@@ -16,14 +16,34 @@ constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
 constexpr double kConverged = 1e-3;  // change of the logarithms
+constexpr std::size_t kFew = 4;      // illuminations that two numbers are found from
+
+/// The same problem under at most kFew of its illuminations that have data.
+ChannelProblem with_few_illuminations(const ChannelProblem& problem) {
+  std::vector<const ChannelIllumination*> usable;
+  for (const ChannelIllumination& i : problem.illuminations) {
+    if (std::any_of(i.weight.begin(), i.weight.end(), [](double w) { return w > 0.0; })) {
+      usable.push_back(&i);
+    }
+  }
+  if (usable.size() <= kFew) return problem;
+  ChannelProblem few = problem;
+  few.illuminations.clear();
+  for (std::size_t n = 0; n < kFew; ++n) {
+    few.illuminations.push_back(*usable[n * (usable.size() - 1) / (kFew - 1)]);
+  }
+  return few;
+}
 
 class Fit {
  public:
   Fit(const ChannelProblem& problem,
       const InverseOptions& options,
-      Objective& objective,
+      diffusion::FluenceSolver& solver,
       std::stop_token stop)
-      : problem_(problem), objective_(objective), stop_(std::move(stop)) {
+      : problem_(problem),
+        objective_(problem, solver, {.tolerance = options.tolerance}),
+        stop_(std::move(stop)) {
     lower_ = Logs(options.reduced_scattering.lowest, options.absorption.lowest).array().log();
     upper_ = Logs(options.reduced_scattering.highest, options.absorption.highest).array().log();
   }
@@ -70,10 +90,7 @@ class Fit {
     return best;
   }
 
-  Result<HomogeneousFit> run() {
-    const auto begin = start();
-    if (!begin) return begin.error();
-    Logs logs = *begin;
+  Result<HomogeneousFit> from(Logs logs) {
     auto r = residuals(logs);
     if (!r) return r.error();
     double damping = 1e-3;
@@ -84,7 +101,8 @@ class Fit {
       if (!moved) return moved.error();
       if (*moved < kConverged) break;
     }
-    return HomogeneousFit{std::exp(logs[0]), std::exp(logs[1]), r->squaredNorm(), iteration};
+    return HomogeneousFit{
+        std::exp(logs[0]), std::exp(logs[1]), r->squaredNorm(), iteration, objective_.solves()};
   }
 
  private:
@@ -130,7 +148,7 @@ class Fit {
   }
 
   const ChannelProblem& problem_;
-  Objective& objective_;
+  Objective objective_;
   std::stop_token stop_;
   Logs lower_;
   Logs upper_;
@@ -140,9 +158,18 @@ class Fit {
 
 Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
                                        const InverseOptions& options,
-                                       Objective& objective,
+                                       diffusion::FluenceSolver& solver,
                                        std::stop_token stop) {
-  return Fit(problem, options, objective, std::move(stop)).run();
+  const ChannelProblem few = with_few_illuminations(problem);
+  Fit sketch(few, options, solver, stop);
+  const auto start = sketch.start();
+  if (!start) return start.error();
+  auto fit = sketch.from(*start);
+  if (!fit || options.max_iterations > 0) return fit;
+  const Logs logs(std::log(fit->reduced_scattering), std::log(fit->absorption));
+  auto last = Fit(problem, options, solver, std::move(stop)).from(logs);
+  if (last) last->solves += fit->solves;
+  return last;
 }
 
 }  // namespace opaline::reconstruct
