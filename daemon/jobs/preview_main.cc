@@ -6,5 +6,5 @@ int main(int argc, char** argv) {
       argc,
       argv,
       {"preview", "Relights a session's material under the held-out lights and writes the report."},
-      opaline::daemon::report_session);
+      [](opaline::daemon::JobContext& job) { return opaline::daemon::report_session(job); });
 }

@@ -55,6 +55,7 @@ Result<ChannelErrors> bssrdf_error(const Material& material,
                                    const TransportResponses& responses,
                                    const render::TranslucencyOptions& options,
                                    reconstruct::diffusion::FluenceSolver& solver,
+                                   const std::function<void(double)>& done,
                                    std::stop_token stop) {
   if (!(material.block == responses.block)) {
     return invalid_argument("the material and the stored light transport have different grids");
@@ -74,6 +75,7 @@ Result<ChannelErrors> bssrdf_error(const Material& material,
           surface_radiance((*fields)[column], responses.seen_face, cosines);
       errors.add(compare(predicted, responses.patch(column, row)));
     }
+    done((row + 1.0) / responses.patches_y);
   }
   return errors;
 }

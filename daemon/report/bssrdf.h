@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <stop_token>
 
 #include "base/material.h"
@@ -19,11 +20,13 @@ namespace opaline::daemon {
 /// R is the stored light transport (radiance for unit irradiance on a patch), R' what the diffusion
 /// equation gives in the material, on the material's grid. The variance of the stored transport
 /// gives the part of E that is its noise.
+/// `done` hears after each row of patches which share of them is done.
 /// Errors: kInvalidArgument when the two do not describe the same block; kCancelled; the solver's.
 Result<ChannelErrors> bssrdf_error(const Material& material,
                                    const TransportResponses& responses,
                                    const render::TranslucencyOptions& options,
                                    reconstruct::diffusion::FluenceSolver& solver,
+                                   const std::function<void(double)>& done,
                                    std::stop_token stop);
 
 }  // namespace opaline::daemon

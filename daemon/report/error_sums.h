@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/material.h"
 
 namespace opaline::daemon {
 
-/// Sums behind a relative error of a prediction L against measurements L* of known variance.
+/// Sums behind a relative error of a prediction L against measurements L* of known variance. Every figure of nothing is
+/// no number: null in results.json, a dash in the report.
 struct ErrorSums {
   double difference = 0.0;  ///< sum of (L - L*)^2
   double signal = 0.0;      ///< sum of L*^2
@@ -23,13 +25,18 @@ struct ErrorSums {
     signal += other.signal;
     noise += other.noise;
   }
-  /// ||L - L*|| / ||L*||; 0 of nothing.
-  double relative() const { return signal > 0.0 ? std::sqrt(difference / signal) : 0.0; }
+  /// ||L - L*|| / ||L*||
+  double relative() const { return std::sqrt(squared()); }
   /// What the measurement's noise alone would give.
-  double floor() const { return signal > 0.0 ? std::sqrt(noise / signal) : 0.0; }
+  double floor() const { return std::sqrt(squared_floor()); }
   /// sum (L - L*)^2 / sum L*^2, the papers' E.
-  double squared() const { return signal > 0.0 ? difference / signal : 0.0; }
-  double squared_floor() const { return signal > 0.0 ? noise / signal : 0.0; }
+  double squared() const { return over_signal(difference); }
+  double squared_floor() const { return over_signal(noise); }
+
+ private:
+  double over_signal(double sum) const {
+    return signal > 0.0 ? sum / signal : std::numeric_limits<double>::quiet_NaN();
+  }
 };
 
 /// The same per colour channel.

@@ -30,7 +30,7 @@ figure img { display: block; width: 100%; height: auto; border-radius: 6px; }
 figure img.cells { image-rendering: pixelated; }
 figcaption { color: var(--soft); font-size: .85rem; line-height: 1.4; padding: .35rem 0 0; }
 .trio { display: grid; grid-template-columns: repeat(3, 1fr); gap: .8rem; margin: .5rem 0 1.5rem; }
-.sheet { display: grid; grid-template-columns: repeat(auto-fill, minmax(118px, 1fr)); gap: .7rem; }
+.sheet { display: grid; grid-template-columns: repeat(auto-fill, minmax(140px, 1fr)); gap: .7rem; }
 .plot { overflow-x: auto; margin: .7rem 0 1.2rem; }
 .plot svg { display: block; max-width: 100%; height: auto; }
 svg [color="black"] { color: inherit; }
@@ -41,6 +41,7 @@ svg text, svg tspan { font-family: inherit; }
 table { border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; margin: .4rem 0 1rem; }
 th, td { padding: .3rem 1.1rem .3rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
 table.numbers td + td, table.numbers th + th { text-align: right; }
+table.told td:last-child, table.told th:last-child { text-align: left; }
 th { font-weight: 600; }
 .wide { overflow-x: auto; }
 pre { background: var(--card); border-radius: 8px; padding: 1rem; overflow-x: auto; font: .8rem/1.45 ui-monospace,
@@ -124,8 +125,11 @@ std::string facts(const std::vector<std::pair<std::string, std::string>>& rows) 
 }
 
 std::string table(const std::vector<std::string>& header,
-                  const std::vector<std::vector<std::string>>& rows) {
-  std::string text = "<div class=\"wide\"><table class=\"numbers\">\n" + row(header, "th");
+                  const std::vector<std::vector<std::string>>& rows,
+                  bool last_is_text) {
+  std::string text = fmt::format("<div class=\"wide\"><table class=\"numbers{}\">\n{}",
+                                 last_is_text ? " told" : "",
+                                 row(header, "th"));
   for (const auto& cells : rows) text += row(cells, "td");
   return text + "</table></div>\n";
 }
@@ -135,6 +139,10 @@ std::string section(std::string_view id, std::string_view title, std::string_vie
 }
 
 std::string paragraph(std::string_view text) { return fmt::format("<p>{}</p>\n", escaped(text)); }
+
+std::string warning(std::string_view text) {
+  return fmt::format("<p class=\"warn\">{}</p>\n", escaped(text));
+}
 
 std::string page(std::string_view title, std::string_view body) {
   return fmt::format(

@@ -26,14 +26,17 @@ std::string drawing(std::string_view svg, std::string_view caption);
 /// A table of names and values, both text.
 std::string facts(const std::vector<std::pair<std::string, std::string>>& rows);
 
-/// A table with a header; the first column is text, the others are numbers. Cells are text.
+/// A table with a header; the first column is text, the others are numbers, or the last is text too.
 std::string table(const std::vector<std::string>& header,
-                  const std::vector<std::vector<std::string>>& rows);
+                  const std::vector<std::vector<std::string>>& rows,
+                  bool last_is_text = false);
 
 /// <section> with a heading; `body` is HTML.
 std::string section(std::string_view id, std::string_view title, std::string_view body);
 
 std::string paragraph(std::string_view text);
+/// A paragraph that stands out: something is missing.
+std::string warning(std::string_view text);
 
 /// A whole page with its style; `body` is HTML.
 std::string page(std::string_view title, std::string_view body);

@@ -224,11 +224,11 @@ Result<std::string> draw(const ScalePlot& plot, std::string_view name, std::stop
     ramp.at(x, 0) = ramp.at(x, 1) = static_cast<float>(value);
   }
   const std::string script =
-      preamble(name, 420, 84) + std::string(kDiverging) +
+      preamble(name, 420, 100) + std::string(kDiverging) +
       fmt::format(
           "\nset cbrange [{0}:{1}]\nset xrange [{0}:{1}]\nset yrange [0:2]\n"
           "unset colorbox\nunset key\nunset ytics\nset xtics out nomirror\nset xlabel {2}\n"
-          "set lmargin 2\nset rmargin 2\nset tmargin 0.3\nset bmargin 3.2\n$ramp << EOD\n{3}EOD\n"
+          "set lmargin 2\nset rmargin 2\nset tmargin 0.3\nset bmargin 4\n$ramp << EOD\n{3}EOD\n"
           "plot $ramp matrix using ({0}+($1+0.5)*{4}):($2+0.5):3 with image notitle\n",
           plot.lowest,
           plot.highest,

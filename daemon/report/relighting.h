@@ -24,6 +24,9 @@ struct RelitLight {
   Image<float> relit;          ///< the same
   Image<std::uint8_t> counts;  ///< 1: the pixel takes part in the error
   ChannelErrors errors;
+
+  /// No pixel takes part: the light could not be used.
+  bool is_empty() const { return !(errors.all().signal > 0.0); }
 };
 
 /// How an illumination's cells of the seen face are explained.
@@ -33,6 +36,9 @@ struct SurfaceFit {
   Image<float> predicted;              ///< L on the seen face, 3 channels
   ChannelErrors errors;                ///< over unmasked cells
   double chi_squared_per_datum = 0.0;  ///< as the reconstruction weighs data: InverseOptions
+
+  /// Every cell is masked: the light could not be used.
+  bool is_empty() const { return !(errors.all().signal > 0.0); }
 };
 
 /// Which pixels see the seen face well inside, not within `margin` pixels of its outline, where the

@@ -23,6 +23,14 @@ struct ContactPicture {
   double saturated_share = 0.0;  ///< of all pixels
 };
 
+/// A plot as it stands in the page, or why it could not be drawn.
+struct DrawnPlot {
+  std::string place;    ///< the section that shows it
+  std::string caption;  ///< text
+  std::string svg;      ///< an SVG element; empty: see `absent`
+  std::string absent;
+};
+
 /// Everything the report and results.json show.
 struct ReportData {
   std::string session_id;
@@ -33,8 +41,9 @@ struct ReportData {
   std::optional<Material> truth;  ///< of a simulated sample
   nlohmann::json reconstruction;  ///< reconstruction.json
   std::vector<ContactPicture> contacts;
-  std::vector<RelitLight> lights;  ///< the held-out ones
+  std::vector<RelitLight> lights;  ///< the held-out ones that could be used; may be none
   std::vector<SurfaceFit> fits;    ///< all
+  std::vector<DrawnPlot> plots;
   std::optional<ChannelErrors> bssrdf;
   std::string bssrdf_absent;  ///< why there is no BSSRDF error
   SessionFacts facts;
@@ -47,6 +56,12 @@ struct ReportData {
   ChannelErrors relighting() const {
     ChannelErrors sum;
     for (const RelitLight& light : lights) sum.add(light.errors);
+    return sum;
+  }
+  /// Over all lights, on the sample's surface.
+  ChannelErrors fit() const {
+    ChannelErrors sum;
+    for (const SurfaceFit& light : fits) sum.add(light.errors);
     return sum;
   }
 };

@@ -9,7 +9,6 @@
 #include "base/io/image_io.h"
 #include "daemon/report/html.h"
 #include "daemon/report/picture.h"
-#include "daemon/report/plot.h"
 #include "daemon/report/report_plots.h"
 
 namespace opaline::daemon {
@@ -17,7 +16,9 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-std::string percent(double share) { return fmt::format("{:.2f} %", 100.0 * share); }
+std::string percent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.2f} %", 100.0 * share) : "–";
+}
 
 std::string seconds_text(double seconds) {
   if (seconds < 100.0) return fmt::format("{:.1f} s", seconds);
@@ -25,11 +26,9 @@ std::string seconds_text(double seconds) {
       "{} min {:02d} s", static_cast<int>(seconds) / 60, static_cast<int>(seconds) % 60);
 }
 
-/// Appends what can fail to a page; after the first failure nothing more is added.
+/// Appends what can fail to a page; after the first failure no more pictures are added.
 class Page {
  public:
-  explicit Page(std::stop_token stop) : stop_(std::move(stop)) {}
-
   void add(std::string_view html) { body_ += html; }
   void add_picture(Image<std::uint8_t> picture, std::string_view caption) {
     if (error_) return;
@@ -40,14 +39,11 @@ class Page {
       body_ += html::picture(*png, caption);
     }
   }
-  template <class Plot>
-  void add_plot(const Plot& plot, std::string_view caption) {
-    if (error_) return;
-    const auto svg = draw(plot, fmt::format("plot{}", ++plots_), stop_);
-    if (!svg) {
-      error_ = svg.error().in(caption);
-    } else {
-      body_ += html::drawing(*svg, caption);
+  void add_plots(const ReportData& data, std::string_view place) {
+    for (const DrawnPlot& plot : data.plots) {
+      if (plot.place != place) continue;
+      add(plot.svg.empty() ? html::warning("Not drawn: " + plot.caption)
+                           : html::drawing(plot.svg, plot.caption));
     }
   }
   void begin(std::string_view id, std::string_view title) {
@@ -60,9 +56,7 @@ class Page {
   }
 
  private:
-  std::stop_token stop_;
   std::string body_;
-  int plots_ = 0;
   std::optional<Error> error_;
 };
 
@@ -87,11 +81,13 @@ std::string key_figure(const std::string& value, std::string_view meaning) {
 void add_key_figures(const ReportData& data, Page& page) {
   const ErrorSums sums = data.relighting().all();
   page.add("<div class=\"figures\">\n");
-  page.add(
-      key_figure(percent(sums.relative()),
-                 fmt::format("relighting error under {} lights kept from the fit; noise alone: {}",
-                             data.lights.size(),
-                             percent(sums.floor()))));
+  if (!data.lights.empty()) {
+    page.add(key_figure(
+        percent(sums.relative()),
+        fmt::format("relighting error under {} lights kept from the fit; noise alone: {}",
+                    data.lights.size(),
+                    percent(sums.floor()))));
+  }
   if (data.bssrdf) {
     const ErrorSums e = data.bssrdf->all();
     page.add(
@@ -108,10 +104,13 @@ void add_key_figures(const ReportData& data, Page& page) {
 }
 
 void add_header(const ReportData& data, Page& page) {
-  page.add(fmt::format("<header><h1>{}</h1>\n<p>Session {}, station {}</p>\n<nav>",
+  const std::string& begun = data.facts.begun;  // 2026-01-31T12:34:56.789Z
+  page.add(fmt::format("<header><h1>{}</h1>\n<p>Session {}, station {}, begun {} {} UTC</p>\n<nav>",
                        html::escaped(data.config.sample_name),
                        html::escaped(data.session_id),
-                       html::escaped(data.config.rig.station)));
+                       html::escaped(data.config.rig.station),
+                       html::escaped(begun.substr(0, 10)),
+                       html::escaped(begun.size() > 16 ? begun.substr(11, 5) : "")));
   for (const auto& [id, title] : {std::pair{"relighting", "Relighting"},
                                   {"capture", "Capture"},
                                   {"fit", "Fit"},
@@ -125,6 +124,16 @@ void add_header(const ReportData& data, Page& page) {
   page.add("</nav></header>\n");
 }
 
+void add_missing_plots(const ReportData& data, Page& page) {
+  const auto is_missing = [](const DrawnPlot& plot) { return plot.svg.empty(); };
+  const auto first = std::ranges::find_if(data.plots, is_missing);
+  if (first == data.plots.end()) return;
+  page.add(html::warning(fmt::format("{} of {} plots could not be drawn: {}",
+                                     std::ranges::count_if(data.plots, is_missing),
+                                     data.plots.size(),
+                                     first->absent)));
+}
+
 /// The light that shows most of the sample stands for all on top.
 const RelitLight& showpiece(const ReportData& data) {
   return *std::max_element(
@@ -133,29 +142,36 @@ const RelitLight& showpiece(const ReportData& data) {
       });
 }
 
+std::vector<std::string> error_row(const std::string& name, const ChannelErrors& errors) {
+  std::vector<std::string> row{
+      name, percent(errors.all().relative()), percent(errors.all().floor())};
+  for (const ErrorSums& channel : errors.channels) row.push_back(percent(channel.relative()));
+  return row;
+}
+
 void add_relighting(const ReportData& data, Page& page) {
   page.begin("relighting", "Relit under lights it has not seen");
-  page.add(
-      html::paragraph(fmt::format("Each light was captured but kept from the fit. All captured and "
-                                  "relit pictures share one scale: "
-                                  "white is {:.3g} W/(mm² sr). Differences are means over the "
-                                  "channels; grey pixels do not count: "
-                                  "background, the lens-blurred outline, saturated or masked ones.",
-                                  data.white)));
-  page.add_plot(
-      ScalePlot{
-          "relit minus captured, % of white", -100.0 * data.difference, 100.0 * data.difference},
-      "Scale of the difference pictures");
+  if (data.lights.empty()) {
+    page.add(html::warning(
+        "How well the material predicts new light is not known: no light was kept from the fit, or "
+        "none of those could be used. Set capture.held_out_lights to 4 or more to measure it."));
+    return page.end();
+  }
+  page.add(html::paragraph(
+      fmt::format("Each light was captured but kept from the fit. All captured and relit pictures "
+                  "share one scale: white is {:.3g} W/(mm² sr). Relit pictures show the sample's "
+                  "sides as well. Differences are means over the channels; grey pixels do not "
+                  "count: background, the lens-blurred outline, saturated or masked ones.",
+                  data.white)));
+  page.add_plots(data, "relighting");
   for (const RelitLight& light : data.lights) add_trio(light, data, page);
   Rows rows;
-  for (const RelitLight& light : data.lights) {
-    std::vector<std::string> row{
-        light.name, percent(light.errors.all().relative()), percent(light.errors.all().floor())};
-    for (const ErrorSums& channel : light.errors.channels)
-      row.push_back(percent(channel.relative()));
-    rows.push_back(std::move(row));
-  }
-  page.add(html::table({"light", "error", "noise floor", "red", "green", "blue"}, rows));
+  for (const RelitLight& light : data.lights) rows.push_back(error_row(light.name, light.errors));
+  rows.push_back(error_row("all together", data.relighting()));
+  page.add(html::paragraph(
+      "The error is ‖L − L*‖ / ‖L*‖ over the pixels that count, L relit and L* captured; the noise "
+      "floor is what the camera's noise alone would give."));
+  page.add(html::table({"light", "error", "noise floor", "error, red", "green", "blue"}, rows));
   page.end();
 }
 
@@ -167,7 +183,7 @@ void add_capture(const ReportData& data, Page& page) {
       data.contacts.size(),
       data.facts.regions_retaken)));
   for (const std::string& why : data.facts.unusable) {
-    page.add(fmt::format("<p class=\"warn\">Not usable: {}</p>\n", html::escaped(why)));
+    page.add(html::warning("Not usable: " + why));
   }
   page.add("<div class=\"sheet\">\n");
   for (const ContactPicture& contact : data.contacts) {
@@ -185,15 +201,13 @@ void add_capture(const ReportData& data, Page& page) {
 
 void add_fit(const ReportData& data, Page& page) {
   page.begin("fit", "How well the pictures are explained");
-  page.add_plot(fit_plot(data), "Relative error on the sample's surface, light by light");
-  page.add_plot(residual_plot(data, false), "Residuals of the lights that were fitted");
-  page.add_plot(residual_plot(data, true), "Residuals of the lights that were not");
+  page.add_plots(data, "fit");
   page.end();
 }
 
 void add_convergence(const ReportData& data, Page& page) {
   page.begin("convergence", "Convergence");
-  page.add_plot(convergence_plot(data), "Misfit over measured variance and model error");
+  page.add_plots(data, "convergence");
   Rows rows;
   const nlohmann::json none = nlohmann::json::array();
   for (const auto& channel : data.reconstruction.value("channels", none)) {
@@ -207,7 +221,9 @@ void add_convergence(const ReportData& data, Page& page) {
          channel.value("stop_explanation", channel.value("stop_reason", ""))});
   }
   page.add(html::table(
-      {"channel", "iterations", "χ² per datum", "data", "solves", "time", "ended because"}, rows));
+      {"channel", "iterations", "χ² per datum", "data", "solves", "time", "ended because"},
+      rows,
+      true));
   page.end();
 }
 
@@ -216,24 +232,21 @@ void add_material(const ReportData& data, Page& page) {
   page.add(
       html::paragraph("Cuts from the lit side (left) to the camera's, and one across the middle. "
                       "The volume itself is "
-                      "material.vdb, in the session's directory."));
-  for (const auto& [coefficient, name] :
-       {std::pair{Coefficient::kAbsorption, "Absorption σa"},
-        {Coefficient::kReducedScattering, "Reduced scattering σs'"},
-        {Coefficient::kDiffusion, "Diffusion coefficient κ = 1 / (3 (σa + σs'))"}}) {
-    page.add(fmt::format("<h3>{}</h3>\n", name));
-    for (int c = 0; c < kColorChannels; ++c) {
-      page.add_plot(slices_plot(data, coefficient, c),
-                    fmt::format("{}, {}", name, kChannelNames[c]));
-    }
+                      "material.vdb, in the session's directory. What the pictures do not "
+                      "determine stays near the homogeneous fit."));
+  for (const Coefficient coefficient : kCoefficients) {
+    page.add(fmt::format("<h3>{}</h3>\n", html::escaped(title_of(coefficient))));
+    page.add_plots(data, place_of(coefficient));
   }
   page.end();
 }
 
 void add_timings(const ReportData& data, Page& page) {
   Rows rows;
-  for (const auto& [stage, seconds] : data.facts.stage_seconds) {
-    rows.push_back({stage, seconds_text(seconds)});
+  for (const char* stage : {"capture", "reconstruct", "preview"}) {
+    const auto found = data.facts.stage_seconds.find(stage);
+    if (found != data.facts.stage_seconds.end())
+      rows.push_back({stage, seconds_text(found->second)});
   }
   rows.push_back({"total", seconds_text(data.facts.total_seconds())});
   page.begin("timings", "Timings");
@@ -253,14 +266,12 @@ void add_settings(const ReportData& data, Page& page) {
 
 }  // namespace
 
-Result<std::string> report_page(const ReportData& data, std::stop_token stop) {
-  if (data.lights.empty()) {
-    return invalid_argument("no held-out light was captured, so there is nothing to show");
-  }
-  Page page(std::move(stop));
+Result<std::string> report_page(const ReportData& data) {
+  Page page;
   add_header(data, page);
+  add_missing_plots(data, page);
   add_key_figures(data, page);
-  add_trio(showpiece(data), data, page);
+  if (!data.lights.empty()) add_trio(showpiece(data), data, page);
   add_relighting(data, page);
   add_capture(data, page);
   add_fit(data, page);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <stop_token>
 #include <string>
 
 #include "base/result.h"
@@ -10,7 +9,7 @@ namespace opaline::daemon {
 
 /// report.html: one file with everything inside, for a browser with or without JavaScript, on
 /// paper, in the dark.
-/// Errors: those of the plots (plot.h); kInvalidArgument when there is no light to show.
-Result<std::string> report_page(const ReportData& data, std::stop_token stop);
+/// Errors: kInternal when a picture cannot be encoded.
+Result<std::string> report_page(const ReportData& data);
 
 }  // namespace opaline::daemon

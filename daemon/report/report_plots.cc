@@ -130,6 +130,30 @@ std::pair<double, double> range_of(const std::vector<MapPanel>& panels, double s
 
 }  // namespace
 
+std::string_view place_of(Coefficient coefficient) {
+  switch (coefficient) {
+    case Coefficient::kAbsorption:
+      return "absorption";
+    case Coefficient::kReducedScattering:
+      return "reduced_scattering";
+    case Coefficient::kDiffusion:
+      return "diffusion";
+  }
+  return "";
+}
+
+std::string_view title_of(Coefficient coefficient) {
+  switch (coefficient) {
+    case Coefficient::kAbsorption:
+      return "Absorption σa";
+    case Coefficient::kReducedScattering:
+      return "Reduced scattering σs'";
+    case Coefficient::kDiffusion:
+      return "Diffusion coefficient κ = 1 / (3 (σa + σs'))";
+  }
+  return "";
+}
+
 CurvePlot convergence_plot(const ReportData& data) {
   CurvePlot plot{"iteration (0: homogeneous fit)", "χ² per datum", true, {}, 0.0, ""};
   const nlohmann::json none = nlohmann::json::array();
@@ -153,15 +177,14 @@ BarPlot fit_plot(const ReportData& data) {
   for (int c = 0; c < kColorChannels; ++c) {
     plot.series.push_back({kChannelNames[c], kChannelColors[c], {}, {}});
   }
-  ChannelErrors all;
   for (const SurfaceFit& fit : data.fits) {
+    if (fit.is_empty()) continue;
     plot.groups.push_back(fit.name);
     for (int c = 0; c < kColorChannels; ++c) {
       plot.series[c].y.push_back(100.0 * fit.errors.channels[c].relative());
     }
-    all.add(fit.errors);
   }
-  plot.level = 100.0 * all.all().floor();
+  plot.level = 100.0 * data.fit().all().floor();
   return plot;
 }
 
@@ -173,7 +196,7 @@ MapPlot residual_plot(const ReportData& data, bool held_out) {
   const int axis = axis_of(data.dataset.seen_face);
   const std::array<double, 3> h = block.spacing();
   for (std::size_t m = 0; m < data.fits.size(); ++m) {
-    if (data.fits[m].held_out != held_out) continue;
+    if (data.fits[m].held_out != held_out || data.fits[m].is_empty()) continue;
     plot.panels.push_back({data.fits[m].name,
                            residual(data.dataset.illuminations[m], data.fits[m]),
                            h[axis == 0 ? 1 : 0],

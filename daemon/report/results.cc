@@ -60,25 +60,38 @@ Json assumptions_json(const ReportData& data) {
   return json;
 }
 
-Json capture_json(const SessionFacts& facts) {
-  return {{"job_runs", facts.runs},
-          {"regions_captured", facts.regions_captured},
-          {"regions_retaken", facts.regions_retaken},
-          {"unusable", facts.unusable}};
+Json capture_json(const ReportData& data) {
+  Json lights = Json::array();
+  for (const ContactPicture& contact : data.contacts) {
+    lights.push_back({{"name", contact.name}, {"saturated_share", contact.saturated_share}});
+  }
+  return {{"begun", data.facts.begun},
+          {"job_runs", data.facts.runs},
+          {"regions_captured", data.facts.regions_captured},
+          {"regions_retaken", data.facts.regions_retaken},
+          {"unusable", data.facts.unusable},
+          {"lights", std::move(lights)}};
+}
+
+Json pictures_json(const ReportData& data) {
+  if (data.lights.empty()) return {{"white", nullptr}, {"difference_scale", nullptr}};
+  return {{"white", data.white}, {"difference_scale", data.difference}};
 }
 
 }  // namespace
 
 std::string results_json(const ReportData& data) {
   const ErrorSums relighting = data.relighting().all();
+  const Block& block = data.material.block;
   Json json;
   json["format"] = 1;
   json["session"] = {{"id", data.session_id},
                      {"name", data.config.name},
                      {"sample", data.config.sample_name},
                      {"station", data.config.rig.station}};
-  json["relighting_error"] = data.lights.empty() ? Json() : Json(relighting.relative());
-  json["relighting_noise_floor"] = data.lights.empty() ? Json() : Json(relighting.floor());
+  json["cells"] = {block.nx, block.ny, block.nz};
+  json["relighting_error"] = relighting.relative();
+  json["relighting_noise_floor"] = relighting.floor();
   json["bssrdf_error"] = data.bssrdf ? Json(data.bssrdf->all().squared()) : Json();
   json["bssrdf_noise"] = data.bssrdf ? Json(data.bssrdf->all().squared_floor()) : Json();
   json["seconds"] = data.facts.total_seconds();
@@ -86,7 +99,9 @@ std::string results_json(const ReportData& data) {
   json["relighting"] = relighting_json(data);
   json["bssrdf"] = bssrdf_json(data);
   json["fit"] = fit_json(data);
-  json["capture"] = capture_json(data.facts);
+  json["fit_noise_floor"] = data.fit().all().floor();
+  json["capture"] = capture_json(data);
+  json["pictures"] = pictures_json(data);
   json["reconstruction"] = data.reconstruction;
   json["assumptions"] = assumptions_json(data);
   json["settings_toml"] = config::to_toml(data.config);

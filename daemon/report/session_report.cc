@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <span>
 #include <utility>
 
+#include "base/clock.h"
 #include "base/event_log.h"
 #include "base/io/dataset_io.h"
 #include "base/io/image_io.h"
@@ -15,9 +18,11 @@
 #include "daemon/jobs/version.h"
 #include "daemon/report/bssrdf.h"
 #include "daemon/report/picture.h"
+#include "daemon/report/plot_sheet.h"
 #include "daemon/report/report_data.h"
 #include "daemon/report/report_page.h"
 #include "daemon/report/results.h"
+#include "daemon/report/step_progress.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/renderer.h"
 #include "render/translucency.h"
@@ -29,6 +34,7 @@ namespace {
 using reconstruct::diffusion::FluenceSolver;
 
 constexpr int kContactPixels = 128;
+constexpr std::size_t kLightsAtATime = 8;  // a batch for the solver; between two, progress
 
 /// The session's files, read.
 Result<ReportData> read_session(const SessionDirectory& session) {
@@ -78,7 +84,7 @@ ContactPicture contact_picture(const std::string& name, const HdrPicture& hdr) {
 class SessionReport {
  public:
   SessionReport(JobContext& job, ReportData data) : job_(job), data_(std::move(data)) {}
-  Result<void> run();
+  Result<void> run(const gpu::ContextOptions& gpu);
 
  private:
   Result<void> light_the_material();
@@ -89,21 +95,20 @@ class SessionReport {
   Result<void> write_pictures(const RelitLight& light);
   Result<void> write_image(const std::string& name, ImageFile image, ImageFormat format);
   Result<void> write_report();
-  void progress(const char* step, double fraction) {
-    job_.events.progress({step, fraction, {}, {}});
-  }
+  StepProgress step(const char* name) { return {job_.events, clock_, name}; }
 
   JobContext& job_;
+  const SystemClock clock_;
   ReportData data_;
   std::unique_ptr<FluenceSolver> solver_;
   std::vector<render::SurfaceField> fields_;
 };
 
-Result<void> SessionReport::run() {
+Result<void> SessionReport::run(const gpu::ContextOptions& gpu) {
   solver_ = reconstruct::host::make_host_solver({.threads = data_.config.reconstruction.threads});
   data_.solver = solver_->description();
   auto renderer = render::Renderer::create(
-      {.gpu = {}, .samples_per_axis = data_.config.preview.samples_per_axis});
+      {.gpu = gpu, .samples_per_axis = data_.config.preview.samples_per_axis});
   if (!renderer) return renderer.error();
   data_.renderer = (*renderer)->description();
   if (auto done = light_the_material(); !done) return done;
@@ -113,23 +118,31 @@ Result<void> SessionReport::run() {
 }
 
 Result<void> SessionReport::light_the_material() {
-  progress("relighting", 0.0);
+  StepProgress progress = step("lighting");
   std::vector<render::Light> lights;
   for (const Illumination& light : data_.dataset.illuminations) {
     lights.push_back({data_.dataset.lit_face, light.irradiance});
   }
-  auto fields =
-      render::illuminate(data_.material, lights, translucency(data_.config), *solver_, job_.stop);
-  if (!fields) return fields.error().in("lighting the material");
-  fields_ = *std::move(fields);
+  const std::span<const render::Light> all(lights);
+  while (fields_.size() < all.size()) {
+    const auto batch =
+        all.subspan(fields_.size(), std::min(kLightsAtATime, all.size() - fields_.size()));
+    auto fields =
+        render::illuminate(data_.material, batch, translucency(data_.config), *solver_, job_.stop);
+    if (!fields) return fields.error().in("lighting the material");
+    std::ranges::move(*fields, std::back_inserter(fields_));
+    progress.done(static_cast<double>(fields_.size()) / static_cast<double>(all.size()));
+  }
   return ok();
 }
 
 Result<void> SessionReport::compare_all(render::Renderer& renderer) {
-  const auto count = static_cast<double>(data_.dataset.illuminations.size());
-  for (std::size_t m = 0; m < data_.dataset.illuminations.size(); ++m) {
-    progress("relighting", static_cast<double>(m) / count);
+  StepProgress progress = step("relighting");
+  const std::vector<Illumination>& lights = data_.dataset.illuminations;
+  for (std::size_t m = 0; m < lights.size(); ++m) {
     if (auto done = compare(renderer, m); !done) return done;
+    progress.done(static_cast<double>(m + 1) / static_cast<double>(lights.size()),
+                  {{"light", lights[m].name}});
   }
   double white = 0.0;
   for (const RelitLight& light : data_.lights) {
@@ -165,12 +178,11 @@ Result<void> SessionReport::compare(render::Renderer& renderer, std::size_t inde
                        *hdr,
                        job_.stop);
   if (!relit) return relit.error();
-  data_.lights.push_back(*std::move(relit));
+  if (!relit->is_empty()) data_.lights.push_back(*std::move(relit));
   return ok();
 }
 
 Result<void> SessionReport::compare_with_transport() {
-  progress("BSSRDF error", 0.0);
   const config::SimConfig& sim = data_.config.rig.sim;
   if (!data_.config.rig.is_simulated() || sim.responses.empty()) {
     data_.bssrdf_absent = "no stored light transport of this sample";
@@ -185,8 +197,14 @@ Result<void> SessionReport::compare_with_transport() {
     data_.bssrdf_absent = "the stored light transport is on another grid than the material";
     return ok();
   }
-  auto errors =
-      bssrdf_error(data_.material, *responses, translucency(data_.config), *solver_, job_.stop);
+  StepProgress progress = step("BSSRDF error");
+  auto errors = bssrdf_error(
+      data_.material,
+      *responses,
+      translucency(data_.config),
+      *solver_,
+      [&](double share) { progress.done(share); },
+      job_.stop);
   if (!errors) return errors.error().in("BSSRDF error");
   data_.bssrdf = *errors;
   return ok();
@@ -232,28 +250,34 @@ Result<void> SessionReport::read_facts() {
 }
 
 Result<void> SessionReport::write_report() {
-  progress("report", 0.0);
-  const ErrorSums relighting = data_.relighting().all();
-  nlohmann::json figures{{"relighting_error", relighting.relative()},
-                         {"noise_floor", relighting.floor()}};
+  StepProgress progress = step("report");
+  auto plots = draw_plots(
+      data_, [&](double share) { progress.done(share); }, job_.stop);
+  if (!plots) return plots.error().in("report");
+  data_.plots = *std::move(plots);
+  nlohmann::json figures = nlohmann::json::object();
+  if (!data_.lights.empty()) {
+    const ErrorSums relighting = data_.relighting().all();
+    figures = {{"relighting_error", relighting.relative()}, {"noise_floor", relighting.floor()}};
+  }
   if (data_.bssrdf) figures["bssrdf_error"] = data_.bssrdf->all().squared();
   if (auto noted = job_.events.fact("preview.completed", figures); !noted) return noted;
   if (auto read = read_facts(); !read) return read;  // up to this very moment
-  const auto page = report_page(data_, job_.stop);
-  if (!page) return page.error().in("report");
   if (auto written = write_whole(job_.files, job_.session.results(), results_json(data_));
       !written) {
     return written;
   }
+  const auto page = report_page(data_);
+  if (!page) return page.error().in("report");
   return write_whole(job_.files, job_.session.report(), *page);
 }
 
 }  // namespace
 
-Result<void> report_session(JobContext& job) {
+Result<void> report_session(JobContext& job, const gpu::ContextOptions& gpu) {
   auto data = read_session(job.session);
   if (!data) return data.error();
-  return SessionReport(job, *std::move(data)).run();
+  return SessionReport(job, *std::move(data)).run(gpu);
 }
 
 }  // namespace opaline::daemon

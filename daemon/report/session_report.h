@@ -2,6 +2,7 @@
 
 #include "base/result.h"
 #include "daemon/jobs/job.h"
+#include "gpu/context.h"
 
 namespace opaline::daemon {
 
@@ -11,9 +12,10 @@ namespace opaline::daemon {
 ///
 /// Reads: resolved.toml, dataset.*, material.vdb, reconstruction.json, hdr/*.exr, events.jsonl, and
 /// of a simulated station its stored light transport.
-/// Progress: "relighting", "BSSRDF error", "report". Fact: preview.completed {relighting_error,
-/// noise_floor, bssrdf_error?}.
-/// Errors: those of the files, the solver, the renderer and the plots; kCancelled.
-Result<void> report_session(JobContext& job);
+/// Progress: "lighting", "relighting", "BSSRDF error", "report". Fact: preview.completed
+/// {relighting_error?, noise_floor?, bssrdf_error?}: without held-out lights that can be used there
+/// are no relit pictures. A plot that cannot be drawn leaves a note in the report.
+/// Errors: those of the files, the solver and the renderer; kCancelled.
+Result<void> report_session(JobContext& job, const gpu::ContextOptions& gpu = {});
 
 }  // namespace opaline::daemon

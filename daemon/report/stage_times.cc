@@ -13,7 +13,7 @@ std::string text_in(const Event& event, const char* key) {
 }
 
 void count(const Event& event, SessionFacts& facts) {
-  if (event.type == "job.started") ++facts.runs;
+  if (event.type == "job.started" && ++facts.runs == 1) facts.begun = event.time;
   if (event.type == "region.captured") ++facts.regions_captured;
   if (event.type == "region.retaken") ++facts.regions_retaken;
   if (event.type == "region.unusable") {

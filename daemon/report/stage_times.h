@@ -13,6 +13,7 @@ namespace opaline::daemon {
 struct SessionFacts {
   std::map<std::string, double> stage_seconds;  ///< all runs of a stage, killed ones up to their
                                                 ///< last sign of life
+  std::string begun;                            ///< when the first job started, UTC
   int runs = 0;                                 ///< of jobs, restarts included
   int regions_captured = 0;
   int regions_retaken = 0;

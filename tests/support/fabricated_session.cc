@@ -33,7 +33,7 @@ Illumination part_of_face(const Block& block, std::string name, double x, double
   return light;
 }
 
-std::vector<Illumination> lights_on(const Block& block, int regions) {
+std::vector<Illumination> lights_on(const Block& block, int regions, int held_out) {
   std::vector<Illumination> lights;
   const double size = 1.0 / regions;
   for (int row = 0; row < regions; ++row) {
@@ -45,6 +45,7 @@ std::vector<Illumination> lights_on(const Block& block, int regions) {
   for (auto& light : {part_of_face(block, "held_out_shifted", 0.5 * size, 0.5 * size, size),
                       part_of_face(block, "held_out_large", 0.0, 0.25, 2.0 * size),
                       part_of_face(block, "held_out_small", 0.5, 0.25, 0.5 * size)}) {
+    if (held_out-- <= 0) break;
     lights.push_back(light);
     lights.back().held_out = true;
   }
@@ -81,7 +82,7 @@ class Fabricator {
     config.rig_file = directory_ / "rig.toml";
     config.rig.sim.responses = what_.responses;
     config.sample.block = what_.truth.block;
-    config.rig.calibration.camera.model = what_.camera;
+    config.rig.sim.rig.camera.model = config.rig.calibration.camera.model = what_.camera;
     return SessionDirectory::create(
         files_, directory_, {config.name, "", "", config::to_toml(config)});
   }
@@ -91,21 +92,21 @@ class Fabricator {
     dataset_.block = block;
     dataset_.ior = what_.truth.ior;
     dataset_.view_cosine = daemon::view_cosines(block, Face::kZMax, what_.camera.centre());
-    dataset_.illuminations = lights_on(block, what_.regions);
+    dataset_.illuminations = lights_on(block, what_.regions, what_.held_out);
     std::vector<render::Light> lights;
     for (const auto& light : dataset_.illuminations)
       lights.push_back({Face::kZMin, light.irradiance});
     const auto solver = reconstruct::host::make_host_solver({});
     const auto fields = render::illuminate(what_.truth, lights, {}, *solver, {});
     if (!fields) return fields.error();
-    const auto renderer = render::Renderer::create({});
+    const auto renderer = render::Renderer::create({.gpu = what_.gpu});
     if (!renderer) return renderer.error();
     if (auto made = files_.make_directories(session.hdr()); !made) return made;
     for (std::size_t m = 0; m < lights.size(); ++m) {
       measure_surface((*fields)[m], dataset_.illuminations[m]);
       const auto picture = (*renderer)->draw((*fields)[m], what_.camera, {});
       if (!picture) return picture.error();
-      if (auto taken = write_hdr(session, dataset_.illuminations[m].name, *picture); !taken) {
+      if (auto taken = write_hdr(session, dataset_.illuminations[m], *picture); !taken) {
         return taken;
       }
     }
@@ -115,10 +116,15 @@ class Fabricator {
   void measure_surface(const render::SurfaceField& field, Illumination& light) {
     light.radiance = daemon::surface_radiance(field, Face::kZMax, dataset_.view_cosine);
     light.radiance_variance = Image<float>(light.radiance.width(), light.radiance.height(), 3);
-    light.mask = Image<std::uint8_t>(light.radiance.width(), light.radiance.height(), 1, 1);
+    light.mask = Image<std::uint8_t>(
+        light.radiance.width(), light.radiance.height(), 1, is_usable(light) ? 1 : 0);
     for (std::size_t i = 0; i < light.radiance.samples().size(); ++i) {
       disturb(light.radiance.samples()[i], light.radiance_variance.samples()[i]);
     }
+  }
+
+  bool is_usable(const Illumination& light) const {
+    return !light.held_out || what_.held_out_works;
   }
 
   void disturb(float& value, float& variance) {
@@ -128,7 +134,7 @@ class Fabricator {
   }
 
   Result<void> write_hdr(const SessionDirectory& session,
-                         const std::string& name,
+                         const Illumination& light,
                          const Image<float>& drawn) {
     Image<float> pixels(drawn.width(), drawn.height(), 8);
     for (int y = 0; y < drawn.height(); ++y) {
@@ -137,14 +143,16 @@ class Fabricator {
           pixels.at(x, y, c) = drawn.at(x, y, c);
           disturb(pixels.at(x, y, c), pixels.at(x, y, 3 + c));
         }
-        pixels.at(x, y, 6) = 1.0F;
+        const bool saturated = y < what_.saturated_rows;
+        pixels.at(x, y, 6) = is_usable(light) && !saturated ? 1.0F : 0.0F;
+        pixels.at(x, y, 7) = saturated ? 1.0F : 0.0F;
       }
     }
     const auto bytes = encode_image(
         {std::move(pixels), {"R", "G", "B", "var.R", "var.G", "var.B", "mask", "saturated"}, {}},
         ImageFormat::kExr);
     if (!bytes) return bytes.error();
-    return write_whole(files_, session.hdr() / (name + ".exr"), *bytes);
+    return write_whole(files_, session.hdr() / (light.name + ".exr"), *bytes);
   }
 
   static std::string reconstruction() {

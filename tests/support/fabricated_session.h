@@ -6,6 +6,7 @@
 #include "base/material.h"
 #include "base/result.h"
 #include "base/session_directory.h"
+#include "gpu/context.h"
 
 namespace opaline::testing {
 
@@ -16,11 +17,15 @@ struct Fabrication {
   CameraModel camera;
   double noise = 0.01;  ///< relative standard deviation of every pixel
   int regions = 2;
+  int held_out = 3;                 ///< lights kept from the fit, 0 to 3
+  bool held_out_works = true;       ///< false: no pixel of theirs can be used
+  int saturated_rows = 0;           ///< of every picture, from the top
+  gpu::ContextOptions gpu;          ///< that draws the pictures
   std::filesystem::path responses;  ///< stored light transport of the truth, or empty
 };
 
 /// A session directory as capture and reconstruction leave it: region pictures under n x n regions
-/// and three held-out lights, drawn by the renderer from the truth.
+/// and the held-out lights, drawn by the renderer from the truth.
 Result<SessionDirectory> fabricate_session(const std::filesystem::path& directory,
                                            const Fabrication& what);
 

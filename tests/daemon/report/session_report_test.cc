@@ -1,11 +1,17 @@
 #include "daemon/report/session_report.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "base/io/image_io.h"
 #include "base/io/transport_io.h"
+#include "daemon/report/html.h"
 #include "daemon/report/surface_radiance.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/translucency.h"
@@ -13,12 +19,20 @@
 #include "sim/scene.h"
 #include "tests/support/fabricated_session.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/vulkan.h"
 
 namespace opaline::daemon {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
+
+/// Keeps what a report says about how far it is.
+class ProgressSink : public NullSink {
+ public:
+  void progress(const Progress& progress) override { steps[progress.step].push_back(progress); }
+  std::map<std::string, std::vector<Progress>> steps;
+};
 
 class SessionReportTest : public ::testing::Test {
  protected:
@@ -32,24 +46,45 @@ class SessionReportTest : public ::testing::Test {
     for (double* value : {&what_.camera.fx, &what_.camera.fy, &what_.camera.cx, &what_.camera.cy}) {
       *value /= 4.0;
     }
+    what_.gpu = tests::validated();
   }
+
+  std::filesystem::path session() const { return directory_.path() / "session"; }
 
   /// Makes the session, runs the report, and answers results.json.
   nlohmann::json report() {
-    const auto session = testing::fabricate_session(directory_.path() / "session", what_);
+    const auto session = testing::fabricate_session(this->session(), what_);
     EXPECT_TRUE(session) << session.error().message;
-    NullSink events;
-    JobContext job{*session, events, system_files(), {}};
-    const auto done = report_session(job);
+    JobContext job{*session, progress_, system_files(), {}};
+    const auto done = report_session(job, tests::validated());
     EXPECT_TRUE(done) << done.error().message;
     page_ = read_text(session->report()).value();
     return nlohmann::json::parse(read_text(session->results()).value());
   }
 
+  std::string section(const std::string& id) const {
+    const std::size_t begin = page_.find("<section id=\"" + id + "\">");
+    EXPECT_NE(begin, std::string::npos) << id;
+    return begin == std::string::npos
+               ? ""
+               : page_.substr(begin, page_.find("</section>", begin) - begin);
+  }
+
   testing::TemporaryDirectory directory_;
   testing::Fabrication what_;
+  ProgressSink progress_;
   std::string page_;
 };
+
+std::string percent(const nlohmann::json& share) {
+  return fmt::format("{:.2f} %", 100.0 * share.get<double>());
+}
+
+std::size_t count(std::string_view text, std::string_view what) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(what); at != text.npos; at = text.find(what, at + 1)) ++found;
+  return found;
+}
 
 TEST_F(SessionReportTest, FindsNoMoreErrorThanNoiseInAPerfectMaterial) {
   const auto results = report();
@@ -102,18 +137,176 @@ TEST_F(SessionReportTest, ComparesWithStoredTransportPatchByPatch) {
   what_.responses = directory_.path() / "stored.transport";
   ASSERT_TRUE(write_transport(system_files(), what_.responses, responses));
 
-  EXPECT_NEAR(report()["bssrdf_error"].get<double>(), std::pow(0.1 / 1.1, 2), 1e-5);
+  const auto results = report();
+  EXPECT_NEAR(results["bssrdf_error"].get<double>(), std::pow(0.1 / 1.1, 2), 1e-5);
+  EXPECT_THAT(page_,
+              HasSubstr(fmt::format("<b>{:.4f}</b>", results["bssrdf_error"].get<double>())));
+  EXPECT_EQ(progress_.steps["BSSRDF error"].size(), 3U);  // at the start, and after two rows
 }
 
 TEST_F(SessionReportTest, PutsEverythingIntoOnePage) {
   report();
   EXPECT_THAT(page_, HasSubstr("<!doctype html>"));
   EXPECT_THAT(page_, HasSubstr("data:image/png;base64,"));
-  EXPECT_THAT(page_, HasSubstr("<svg"));
-  EXPECT_THAT(page_, HasSubstr("held_out_shifted"));
   EXPECT_THAT(page_, Not(HasSubstr("<script")));
   EXPECT_THAT(page_, Not(HasSubstr("src=\"http")));
   EXPECT_THAT(page_, Not(HasSubstr("href=\"http")));
+}
+
+TEST_F(SessionReportTest, ShowsTheErrorOfEachLightAndOfAllTogether) {
+  what_.noise = 0.02;
+  const auto results = report();
+  const std::string shown = section("relighting");
+  ASSERT_EQ(results["relighting"]["lights"].size(), 3U);
+  std::set<std::string> errors;
+  for (const auto& light : results["relighting"]["lights"]) {
+    EXPECT_THAT(shown,
+                HasSubstr(fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
+                                      light["name"].get<std::string>(),
+                                      percent(light["error"]),
+                                      percent(light["noise_floor"]),
+                                      percent(light["per_channel"]["red"]))));
+    errors.insert(percent(light["error"]));
+  }
+  EXPECT_GT(errors.size(), 1U);  // each has its own
+  EXPECT_THAT(shown,
+              HasSubstr(fmt::format("<td>all together</td><td>{}</td><td>{}</td>",
+                                    percent(results["relighting_error"]),
+                                    percent(results["relighting_noise_floor"]))));
+  EXPECT_THAT(page_, HasSubstr("<b>" + percent(results["relighting_error"]) + "</b>"));
+  EXPECT_THAT(
+      shown,
+      HasSubstr(fmt::format("white is {:.3g} W/", results["pictures"]["white"].get<double>())));
+  EXPECT_GT(results["pictures"]["difference_scale"].get<double>(), 0.0);
+  EXPECT_EQ(count(shown, "<img"), 9U);
+  EXPECT_EQ(count(shown, "<svg"), 1U);
+}
+
+TEST_F(SessionReportTest, WritesThePicturesOfEachHeldOutLight) {
+  const auto results = report();
+  for (const auto& light : results["relighting"]["lights"]) {
+    for (const char* ending :
+         {"captured.png", "relit.png", "difference.png", "captured.exr", "relit.exr"}) {
+      const auto path =
+          session() / "preview" / fmt::format("{}-{}", light["name"].get<std::string>(), ending);
+      const auto bytes = read_bytes(path, 1 << 24);
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      EXPECT_TRUE(decode_image(*bytes)) << path;
+    }
+  }
+}
+
+TEST_F(SessionReportTest, ShowsEachCapturedPictureAndWhatIsSaturatedInIt) {
+  what_.saturated_rows = 16;
+  const auto results = report();
+  const std::string shown = section("capture");
+  ASSERT_EQ(results["capture"]["lights"].size(), 7U);
+  for (const auto& light : results["capture"]["lights"]) {
+    EXPECT_EQ(light["saturated_share"].get<double>(), 0.25);
+    EXPECT_THAT(shown, HasSubstr(light["name"].get<std::string>() + ", 25.00 % saturated"));
+  }
+  EXPECT_EQ(count(shown, "<img"), 7U);
+}
+
+TEST_F(SessionReportTest, ShowsHowThePicturesAreExplained) {
+  const auto results = report();
+  const std::string fit = section("fit");
+  EXPECT_EQ(count(fit, "<svg"), 3U);
+  for (const auto& light : results["fit"]) {
+    EXPECT_THAT(fit, HasSubstr(light["name"].get<std::string>()));
+    EXPECT_TRUE(light["error"].is_number());
+  }
+  EXPECT_NEAR(results["fit_noise_floor"].get<double>(), 0.01, 0.0005);
+  const std::string convergence = section("convergence");
+  EXPECT_EQ(count(convergence, "<svg"), 1U);
+  for (const auto& channel : results["reconstruction"]["channels"]) {
+    EXPECT_THAT(convergence,
+                HasSubstr(fmt::format("<td>{}</td><td>{}</td><td>{:.4g}</td>",
+                                      channel["channel"].get<std::string>(),
+                                      channel["history"].size() - 1,
+                                      channel["chi_squared_per_datum"].get<double>())));
+    EXPECT_THAT(convergence, HasSubstr(channel["stop_explanation"].get<std::string>()));
+  }
+}
+
+TEST_F(SessionReportTest, CutsEachCoefficientOfEachChannel) {
+  report();
+  const std::string shown = section("material");
+  EXPECT_EQ(count(shown, "<svg"), 9U);
+  for (const char* label : {"absorption σa, 1/mm", "scattering σs', 1/mm", "diffusion κ, mm"}) {
+    EXPECT_THAT(shown, HasSubstr(label));
+  }
+}
+
+TEST_F(SessionReportTest, SaysWhatWasAssumedAndSetAndHowLongItTook) {
+  const auto results = report();
+  ASSERT_GT(results["assumptions"].size(), 5U);
+  for (const auto& [what, value] : results["assumptions"].items()) {
+    EXPECT_THAT(section("assumptions"), HasSubstr(html::escaped(value.get<std::string>()))) << what;
+  }
+  EXPECT_THAT(section("settings"),
+              HasSubstr(html::escaped(results["settings_toml"].get<std::string>())));
+  const std::string timings = section("timings");
+  for (const auto& [stage, seconds] : results["seconds_per_stage"].items()) {
+    EXPECT_THAT(timings,
+                HasSubstr(fmt::format("<td>{}</td><td>{:.1f} s", stage, seconds.get<double>())));
+  }
+  EXPECT_THAT(timings, HasSubstr(results["versions"]["solver"].get<std::string>()));
+  EXPECT_EQ(results["cells"], nlohmann::json({12, 12, 6}));
+}
+
+TEST_F(SessionReportTest, DoesWithoutHeldOutLights) {
+  what_.held_out = 0;
+  const auto results = report();
+  EXPECT_TRUE(results["relighting_error"].is_null());
+  EXPECT_TRUE(results["pictures"]["white"].is_null());
+  EXPECT_EQ(results["fit"].size(), 4U);
+  EXPECT_THAT(section("relighting"), HasSubstr("no light was kept from the fit"));
+  EXPECT_EQ(count(section("fit"), "<svg"), 2U);
+  EXPECT_THAT(page_, Not(HasSubstr("class=\"trio\"")));
+}
+
+TEST_F(SessionReportTest, DoesWithHeldOutLightsThatCannotBeUsed) {
+  what_.held_out_works = false;
+  const auto results = report();
+  EXPECT_TRUE(results["relighting_error"].is_null());
+  EXPECT_EQ(results["relighting"]["lights"].size(), 0U);
+  EXPECT_TRUE(results["fit"].back()["error"].is_null());
+  EXPECT_THAT(section("relighting"), HasSubstr("none of those could be used"));
+}
+
+/// A path without programs, for the test's duration.
+class NoPrograms {
+ public:
+  NoPrograms() : path_(std::getenv("PATH")) { ::setenv("PATH", "/nonexistent", 1); }
+  ~NoPrograms() { ::setenv("PATH", path_.c_str(), 1); }
+
+ private:
+  std::string path_;
+};
+
+TEST_F(SessionReportTest, LeavesNotesWhereGnuplotIsMissing) {
+  const NoPrograms none;
+  const auto results = report();
+  EXPECT_TRUE(results["relighting_error"].is_number());
+  EXPECT_THAT(page_, HasSubstr("14 of 14 plots could not be drawn"));
+  EXPECT_THAT(page_, HasSubstr("apt install gnuplot-nox"));
+  EXPECT_THAT(section("convergence"), HasSubstr("Not drawn: Misfit"));
+}
+
+TEST_F(SessionReportTest, TellsHowFarEachStepIs) {
+  report();
+  for (const auto& [step, times] :
+       std::map<std::string, std::size_t>{{"lighting", 2}, {"relighting", 8}, {"report", 15}}) {
+    const auto& heard = progress_.steps[step];
+    ASSERT_EQ(heard.size(), times) << step;
+    EXPECT_EQ(heard.front().fraction, 0.0);
+    EXPECT_EQ(heard.back().fraction, 1.0);
+    for (std::size_t i = 1; i < heard.size(); ++i) {
+      EXPECT_GT(heard[i].fraction, heard[i - 1].fraction);
+      EXPECT_TRUE(heard[i].seconds_left) << step;
+    }
+  }
 }
 
 }  // namespace
