@@ -103,11 +103,12 @@ std::vector<NamedRectangle> held_out_rectangles(int n, int count, double width, 
 }
 
 std::vector<NamedRectangle> rectangles(const PatternOptions& options,
-                                       double face_width,
-                                       double face_height) {
+                                       const Block& block,
+                                       Face lit_face) {
   const int n = options.regions;
-  const double width = face_width / n;
-  const double height = face_height / n;
+  const CellSize cell = face_cell_size(block, lit_face);
+  const double width = block.face_width(lit_face) * cell.width / n;
+  const double height = block.face_height(lit_face) * cell.height / n;
   std::vector<NamedRectangle> lights;
   for (int row = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column) {
@@ -130,18 +131,20 @@ struct PixelRectangle {
 };
 
 PixelRectangle pixels_of(const LitRectangle& r, const ProjectorCalibration& p) {
+  constexpr double kFar = 1e9;  // outside every picture, and an int
   const auto x = [&](double mm) {
-    return static_cast<int>(std::lround(p.offset_x_px + mm / p.mm_per_pixel));
+    return static_cast<int>(
+        std::lround(std::clamp(p.offset_x_px + mm / p.mm_per_pixel, -kFar, kFar)));
   };
   const auto y = [&](double mm) {
-    return static_cast<int>(std::lround(p.offset_y_px + mm / p.mm_per_pixel));
+    return static_cast<int>(
+        std::lround(std::clamp(p.offset_y_px + mm / p.mm_per_pixel, -kFar, kFar)));
   };
   return {x(r.left), y(r.top), x(r.left + r.width), y(r.top + r.height)};
 }
 
-Result<drivers::Pattern> pattern_of(const NamedRectangle& light,
-                                    std::uint64_t id,
-                                    const ProjectorCalibration& projector) {
+Result<PixelRectangle> pixels_within(const NamedRectangle& light,
+                                     const ProjectorCalibration& projector) {
   const PixelRectangle box = pixels_of(light.rectangle, projector);
   if (box.left < 0 || box.top < 0 || box.right > projector.width || box.bottom > projector.height) {
     return invalid_argument(
@@ -159,6 +162,12 @@ Result<drivers::Pattern> pattern_of(const NamedRectangle& light,
     return invalid_argument(
         fmt::format("{} is smaller than a projector pixel: expected fewer regions", light.name));
   }
+  return box;
+}
+
+drivers::Pattern pattern_of(const PixelRectangle& box,
+                            std::uint64_t id,
+                            const ProjectorCalibration& projector) {
   drivers::Pattern pattern{id, Image<std::uint8_t>(projector.width, projector.height, 3, 0)};
   for (int y = box.top; y < box.bottom; ++y) {
     for (int x = box.left; x < box.right; ++x) {
@@ -213,18 +222,26 @@ Result<PatternSet> make_patterns(const PatternOptions& options,
                                  const Block& block,
                                  Face lit_face,
                                  const ProjectorCalibration& projector) {
-  const CellSize cell = face_cell_size(block, lit_face);
-  const double face_width = block.face_width(lit_face) * cell.width;
-  const double face_height = block.face_height(lit_face) * cell.height;
   PatternSet set{uniform(kBlackPattern, projector, 0), uniform(kWhitePattern, projector, 255), {}};
   std::uint64_t id = kFirstLight;
-  for (const NamedRectangle& light : rectangles(options, face_width, face_height)) {
-    auto pattern = pattern_of(light, id++, projector);
-    if (!pattern) return pattern.error();
-    Image<float> irradiance = irradiance_of(pattern->codes, block, lit_face, projector);
-    set.lights.push_back({light.name, light.held_out, *std::move(pattern), std::move(irradiance)});
+  for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
+    const auto box = pixels_within(light, projector);
+    if (!box) return box.error();
+    drivers::Pattern pattern = pattern_of(*box, id++, projector);
+    Image<float> irradiance = irradiance_of(pattern.codes, block, lit_face, projector);
+    set.lights.push_back({light.name, light.held_out, std::move(pattern), std::move(irradiance)});
   }
   return set;
+}
+
+Result<void> check_patterns(const PatternOptions& options,
+                            const Block& block,
+                            Face lit_face,
+                            const ProjectorCalibration& projector) {
+  for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
+    if (const auto box = pixels_within(light, projector); !box) return box.error();
+  }
+  return ok();
 }
 
 }  // namespace opaline::capture

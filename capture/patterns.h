@@ -53,6 +53,12 @@ Result<PatternSet> make_patterns(const PatternOptions& options,
                                  Face lit_face,
                                  const ProjectorCalibration& projector);
 
+/// What make_patterns() would say against it, without making them.
+Result<void> check_patterns(const PatternOptions& options,
+                            const Block& block,
+                            Face lit_face,
+                            const ProjectorCalibration& projector);
+
 /// Irradiance on the lit face's cells while the projector shows `codes`, less that of code 0: each
 /// pixel's light, shared among cells by the area it covers of each (exact overlap).
 Image<float> irradiance_of(const Image<std::uint8_t>& codes,

@@ -68,16 +68,30 @@ Span pixels_between(double low, double high, int size) {
 
 // The face is flat, so that its corners tell for all of it.
 Result<void> check_direction(const Block& block, Face face, const CameraModel& camera) {
+  const Vec3 eye = camera.centre();
+  if (!(dot(outward_normal(face), eye - face_point(block, face, 0.0, 0.0)) > 0.0)) {
+    return invalid_argument(
+        fmt::format("the camera at ({:.1f}, {:.1f}, {:.1f}) mm is not in front of face {}",
+                    eye.x,
+                    eye.y,
+                    eye.z,
+                    to_string(face)));
+  }
   const double width = block.face_width(face);
   const double height = block.face_height(face);
   for (const auto& [u, v] : {std::pair{0.0, 0.0}, {width, 0.0}, {width, height}, {0.0, height}}) {
     if (camera.faces(face_point(block, face, u, v))) continue;
-    return invalid_argument(fmt::format(
-        "the camera looks away from face {}: expected a pose in which its +Z axis points at the "
-        "sample (camera_from_sample, as OpenCV has it)",
-        std::string(to_string(face))));
+    return invalid_argument(
+        fmt::format("the camera looks away from face {}: expected a pose whose +Z axis points at "
+                    "the sample (camera_from_sample, as OpenCV has it)",
+                    to_string(face)));
   }
   return ok();
+}
+
+Error sees_nothing(Face face) {
+  return invalid_argument(
+      fmt::format("the camera sees nothing of face {}: is its pose right?", to_string(face)));
 }
 
 }  // namespace
@@ -122,16 +136,7 @@ Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const Camer
   for (int row = 0; row < map.height_; ++row) {
     for (int column = 0; column < map.width_; ++column) {
       const Vec3 towards = normalized(eye - face_point(block, face, column + 0.5, row + 0.5));
-      const double cosine = dot(normal, towards);
-      if (!(cosine > 0.0)) {
-        return invalid_argument(
-            fmt::format("the camera at ({:.1f}, {:.1f}, {:.1f}) mm is not in front of face {}",
-                        eye.x,
-                        eye.y,
-                        eye.z,
-                        std::string(to_string(face))));
-      }
-      map.view_cosine_.at(column, row) = static_cast<float>(cosine);
+      map.view_cosine_.at(column, row) = static_cast<float>(dot(normal, towards));
       map.add_cell({camera.project(face_point(block, face, column, row)),
                     camera.project(face_point(block, face, column + 1, row)),
                     camera.project(face_point(block, face, column + 1, row + 1)),
@@ -141,11 +146,19 @@ Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const Camer
   }
   map.drop_partial_pixels(camera);
   const bool seen = std::ranges::any_of(map.footprint_.samples(), [](auto f) { return f != 0; });
-  if (!seen) {
-    return invalid_argument(fmt::format("the camera sees nothing of face {}: is its pose right?",
-                                        std::string(to_string(face))));
-  }
+  if (!seen) return sees_nothing(face);
   return map;
+}
+
+Result<void> SurfaceMap::check(const Block& block, Face face, const CameraModel& camera) {
+  if (auto direction = check_direction(block, face, camera); !direction) return direction;
+  for (int row = 0; row < block.face_height(face); ++row) {
+    for (int column = 0; column < block.face_width(face); ++column) {
+      const Pixel p = camera.project(face_point(block, face, column + 0.5, row + 0.5));
+      if (p.x >= 0.0 && p.y >= 0.0 && p.x < camera.width && p.y < camera.height) return ok();
+    }
+  }
+  return sees_nothing(face);
 }
 
 SurfaceRadiance SurfaceMap::apply(const HdrImage& hdr, double min_coverage) const {

@@ -27,6 +27,9 @@ class SurfaceMap {
   /// Errors: kInvalidArgument when the camera is behind the face, is turned away from it, or sees
   /// none of it.
   static Result<SurfaceMap> create(const Block& block, Face face, const CameraModel& camera);
+  /// What create() would say against it, without the work: whether some cell's middle is in the
+  /// picture.
+  static Result<void> check(const Block& block, Face face, const CameraModel& camera);
   /// A cell needs `min_coverage` of its area on usable pixels.
   SurfaceRadiance apply(const HdrImage& hdr, double min_coverage) const;
   /// 1 for camera pixels that lie wholly on the face.

@@ -79,6 +79,8 @@ class Fields {
 
   /// Whether values are filled in, and not printed.
   virtual bool is_reading() const = 0;
+  /// Whether nothing was wrong in this table up to here, so that its values are those of the file.
+  virtual bool is_sound() const = 0;
 
   // The same for the types that options have.
   void number(const Key& key, double& value, Range range = {}) {

@@ -276,15 +276,41 @@ void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool
 }
 
 void visit_calibration(Fields& fields, RigConfig& rig) {
-  const bool required = rig.camera != Driver::kSim;
-  fields.table({"camera", "The camera."},
-               [&](Fields& f) { visit_calibrated_camera(f, rig.calibration.camera, required); });
-  fields.table({"projector", "The projector; its light falls perpendicular on the lit face."},
-               [&](Fields& f) {
-                 capture::ProjectorCalibration& p = rig.calibration.projector;
-                 visit_projection(f, p);
-                 visit_vignetting(f, p.vignetting.coefficients);
-               });
+  const bool simulated = rig.camera == Driver::kSim;
+  fields.table({"camera", "The camera."}, [&](Fields& f) {
+    const capture::CameraCalibration& c = rig.calibration.camera;
+    const sim::CameraOptics& real = rig.sim.rig.camera;
+    visit_calibrated_camera(f, rig.calibration.camera, !simulated);
+    const bool same = c.model.width == real.model.width && c.model.height == real.model.height &&
+                      c.bit_depth == real.bit_depth;
+    f.check(
+        !simulated || same,
+        "width",
+        fmt::format("the picture has {} x {} pixels of {} bits; expected the simulated camera's "
+                    "{} x {} of {}",
+                    c.model.width,
+                    c.model.height,
+                    c.bit_depth,
+                    real.model.width,
+                    real.model.height,
+                    real.bit_depth));
+  });
+  fields.table(
+      {"projector", "The projector; its light falls perpendicular on the lit face."},
+      [&](Fields& f) {
+        capture::ProjectorCalibration& p = rig.calibration.projector;
+        visit_projection(f, p);
+        visit_vignetting(f, p.vignetting.coefficients);
+        const sim::ProjectorOptics& real = rig.sim.rig.projector;
+        f.check(rig.projector != Driver::kSim || (p.width == real.width && p.height == real.height),
+                "width",
+                fmt::format("the picture has {} x {} pixels; expected the simulated "
+                            "projector's {} x {}",
+                            p.width,
+                            p.height,
+                            real.width,
+                            real.height));
+      });
 }
 
 }  // namespace

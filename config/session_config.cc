@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <initializer_list>
 #include <utility>
 
 #include "base/ensure.h"
 #include "base/files.h"
+#include "config/agreement.h"
 #include "config/block_fields.h"
 
 namespace opaline::config {
@@ -44,7 +45,8 @@ void visit_exposures(Fields& fields, capture::ExposureOptions& e) {
       {"dark_quantile", "which pixel counts as dark"}, e.dark_quantile, Range::between(0, 0.5));
 }
 
-void visit_capture(Fields& fields, capture::CaptureOptions& c) {
+void visit_capture(Fields& fields, SessionConfig& session, const Agreement* agreement) {
+  capture::CaptureOptions& c = session.capture;
   fields.whole({"regions", "n: the lit face is lit in n x n regions"},
                c.patterns.regions,
                Range::between(1, 32));
@@ -64,8 +66,11 @@ void visit_capture(Fields& fields, capture::CaptureOptions& c) {
   fields.number({"usable_share", "of the regions; fewer usable ones end the session"},
                 c.usable_share,
                 Range::between(0, 1));
-  fields.table({"exposures", "Exposures the bracket is chosen from."},
-               [&](Fields& f) { visit_exposures(f, c.exposures); });
+  fields.table({"exposures", "Exposures the bracket is chosen from."}, [&](Fields& f) {
+    visit_exposures(f, c.exposures);
+    if (agreement != nullptr) agreement->visit_exposures(f, c.exposures);
+  });
+  if (agreement != nullptr) agreement->visit_patterns(fields, c.patterns, session.sample);
 }
 
 void visit_bounds(Fields& fields, reconstruct::CoefficientBounds& bounds) {
@@ -117,38 +122,18 @@ void visit_preview(Fields& fields, PreviewOptions& p) {
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
 }
 
-bool same_length(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(a, b); }
-
-/// What a simulated rig must agree on with the session's sample; reported where the sample stands.
-void visit_agreement(Fields& fields, const SessionConfig& session) {
-  if (!session.rig.is_simulated()) return;
-  const SimConfig& sim = session.rig.sim;
-  const Vec3 want = sim.scene.block.size();
-  const Vec3 have = session.sample.block.size();
-  fields.check(
-      same_length(want.x, have.x) && same_length(want.y, have.y) && same_length(want.z, have.z),
-      "size",
-      fmt::format("the simulated sample measures {} x {} x {} mm", want.x, want.y, want.z));
-  fields.check(sim.transport.lit_face == session.sample.lit_face,
-               "lit_face",
-               fmt::format("the simulated light enters by {}", to_string(sim.transport.lit_face)));
-  fields.check(sim.transport.seen_face == session.sample.seen_face,
-               "seen_face",
-               fmt::format("the simulated camera sees {}", to_string(sim.transport.seen_face)));
-}
-
-/// `rig_is_known`: session.rig has been read, and the two files must agree.
-void visit_session(Fields& fields, SessionConfig& session, bool rig_is_known) {
+/// `agreement` with the rig, when that has been read.
+void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement = nullptr) {
   fields.text({"name", "of the session, for people"}, session.name);
   std::string rig_file = session.rig_file.string();
   fields.text({"rig", "the rig file", true}, rig_file);
   session.rig_file = rig_file;
   fields.table({"sample", "What is measured."}, [&](Fields& f) {
     visit_sample(f, session);
-    if (rig_is_known) visit_agreement(f, session);
+    if (agreement != nullptr) agreement->visit_sample(f, session.sample);
   });
   fields.table({"capture", "How it is captured."},
-               [&](Fields& f) { visit_capture(f, session.capture); });
+               [&](Fields& f) { visit_capture(f, session, agreement); });
   fields.table({"reconstruction", "How the material is found."},
                [&](Fields& f) { visit_reconstruction(f, session.reconstruction); });
   fields.table({"preview", "How the report's pictures are made."},
@@ -169,12 +154,12 @@ Result<SessionConfig> accept(Loaded loaded) {
 /// Reads the rig before the session, so that the session's own visit can compare.
 Loaded read_both(const Source& session, const Source& rig, bool check_files) {
   Loaded loaded;
-  loaded.problems =
+  const auto of_rig =
       read_toml(rig, [&](Fields& f) { visit_rig(f, loaded.session.rig, check_files); });
-  const bool rig_is_good = loaded.problems.empty();
-  const auto own =
-      read_toml(session, [&](Fields& f) { visit_session(f, loaded.session, rig_is_good); });
-  loaded.problems.insert(loaded.problems.begin(), own.begin(), own.end());
+  Agreement agreement(loaded.session.rig, of_rig);
+  loaded.problems =
+      read_toml(session, [&](Fields& f) { visit_session(f, loaded.session, &agreement); });
+  loaded.problems.insert(loaded.problems.end(), of_rig.begin(), of_rig.end());
   return loaded;
 }
 
@@ -196,7 +181,7 @@ RigReference rig_reference(const Source& session, const Error* missing) {
   RigReference reference;
   reference.problems = read_toml(session, [&](Fields& f) {
     SessionConfig ignored;
-    visit_session(f, ignored, false);
+    visit_session(f, ignored);
     reference.file = ignored.rig_file;
     if (missing != nullptr) {
       f.check(false, "rig", fmt::format("{}; expected a rig file", missing->message));
@@ -218,13 +203,14 @@ Result<Loaded> load_both(const fs::path& session_file) {
   return loaded;
 }
 
-/// By its tables: what has nothing of a rig is taken for a session.
+/// By its tables: what has one of a session's is a session, whatever strayed into it.
 bool is_rig_file(const Source& source) {
   const auto keys = top_level_keys(source);
-  return std::any_of(keys.begin(), keys.end(), [](const std::string& key) {
-    return key == "station" || key == "camera" || key == "projector" || key == "sim" ||
-           key == "calibration" || key == "replay";
-  });
+  const auto has_one_of = [&](std::initializer_list<std::string_view> names) {
+    return std::ranges::find_first_of(keys, names) != keys.end();
+  };
+  return !has_one_of({"rig", "sample", "capture", "reconstruction", "preview"}) &&
+         has_one_of({"station", "camera", "projector", "sim", "calibration", "replay"});
 }
 
 }  // namespace
@@ -263,7 +249,7 @@ Result<std::vector<Problem>> check(const fs::path& file) {
 namespace {
 
 void visit_resolved(Fields& fields, SessionConfig& session) {
-  fields.table({"session", ""}, [&](Fields& f) { visit_session(f, session, false); });
+  fields.table({"session", ""}, [&](Fields& f) { visit_session(f, session); });
   fields.table({"rig", ""}, [&](Fields& f) { visit_rig(f, session.rig, false); });
 }
 
@@ -302,7 +288,7 @@ std::string session_example() {
   SessionConfig session;
   session.rig_file = "rig.example.toml";
   return "# Every key of a session file, with its default. Copy what you change.\n" +
-         write_toml([&](Fields& f) { visit_session(f, session, false); }, true);
+         write_toml([&](Fields& f) { visit_session(f, session); }, true);
 }
 
 std::string rig_example() {

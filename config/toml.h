@@ -15,8 +15,13 @@ struct Problem {
   int line = 0;  ///< 0 when it is about the file as a whole
   int column = 0;
   std::string message;
+  std::string table;  ///< "sim.camera"; empty: the top of the file, or all of it
   bool operator==(const Problem&) const = default;
 };
+
+/// Whether nothing is wrong in a table or in one within it, nor in those around it, where its name
+/// may have been misspelt.
+bool is_sound(const std::vector<Problem>& problems, std::string_view table);
 
 /// "sim.toml:12:9: unknown key \"colour\"; did you mean \"color\"?"
 std::string to_string(const Problem& problem);

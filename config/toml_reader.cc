@@ -57,18 +57,22 @@ struct Findings {
   std::vector<UnknownKey> unknown{};
   std::map<std::string, std::set<std::string, std::less<>>> known{};  ///< keys by table
 
-  void add(toml::source_position where, std::string message) {
+  void add(toml::source_position where, std::string message, std::string table) {
     problems.push_back({source.file,
                         static_cast<int>(where.line),
                         static_cast<int>(where.column),
-                        std::move(message)});
+                        std::move(message),
+                        std::move(table)});
   }
 };
 
 class Reader : public Fields {
  public:
   Reader(Findings& findings, const toml::table& table, std::string name)
-      : findings_(findings), table_(table), name_(std::move(name)) {}
+      : findings_(findings),
+        table_(table),
+        name_(std::move(name)),
+        problems_before_(findings.problems.size()) {}
 
   void table(const Key& key, const Visit& visit) override {
     const std::string name =
@@ -164,6 +168,14 @@ class Reader : public Fields {
 
   bool is_reading() const override { return true; }
 
+  bool is_sound() const override {
+    const auto& known = findings_.known[name_];
+    return findings_.problems.size() == problems_before_ &&
+           std::all_of(table_.begin(), table_.end(), [&](const auto& entry) {
+             return known.contains(entry.first.str());
+           });
+  }
+
   void choice(const Key& key,
               std::size_t& index,
               std::span<const std::string_view> names) override {
@@ -183,7 +195,8 @@ class Reader : public Fields {
     if (holds) return;
     const toml::node* node = table_.get(key);
     findings_.add(node != nullptr ? node->source().begin : table_.source().begin,
-                  fmt::format("{}: {}", key, expected));
+                  fmt::format("{}: {}", key, expected),
+                  name_);
   }
 
   /// Call after the visit: what nobody asked for is unknown.
@@ -212,7 +225,8 @@ class Reader : public Fields {
       const std::string length = count == 0 ? "" : fmt::format(" of {}", count);
       findings_.add(
           node->source().begin,
-          fmt::format("{} is {}; expected a list{}, each {}", key.name, found, length, each));
+          fmt::format("{} is {}; expected a list{}, each {}", key.name, found, length, each),
+          name_);
       return;
     }
     std::vector<T> read;
@@ -232,14 +246,16 @@ class Reader : public Fields {
                     fmt::format("missing key \"{}\"{}: {}",
                                 key.name,
                                 name_.empty() ? "" : fmt::format(" in [{}]", name_),
-                                key.help));
+                                key.help),
+                    name_);
     }
     return node;
   }
 
   void wrong(const Key& key, const toml::node& node, const std::string& expected) {
     findings_.add(node.source().begin,
-                  fmt::format("{} is {}; expected {}", key.name, shown(node), expected));
+                  fmt::format("{} is {}; expected {}", key.name, shown(node), expected),
+                  name_);
   }
 
   static std::optional<double> number_in(const toml::node& node, Unit unit) {
@@ -261,6 +277,7 @@ class Reader : public Fields {
   Findings& findings_;
   const toml::table& table_;
   std::string name_;
+  std::size_t problems_before_;
   bool missing_ = false;
 };
 
@@ -286,7 +303,8 @@ std::vector<Problem> sorted(Findings findings) {
                  fmt::format("unknown key \"{}\"{}; {}",
                              unknown.key,
                              unknown.table.empty() ? "" : fmt::format(" in [{}]", unknown.table),
-                             suggestion(findings, unknown)));
+                             suggestion(findings, unknown)),
+                 unknown.table);
   }
   std::stable_sort(
       findings.problems.begin(), findings.problems.end(), [](const Problem& a, const Problem& b) {
@@ -311,11 +329,22 @@ std::string to_string(const std::vector<Problem>& problems) {
   return text;
 }
 
+bool is_sound(const std::vector<Problem>& problems, std::string_view table) {
+  return std::none_of(problems.begin(), problems.end(), [&](const Problem& problem) {
+    const std::string_view place = problem.table;
+    const std::string_view outer = place.size() < table.size() ? place : table;
+    const std::string_view inner = place.size() < table.size() ? table : place;
+    const bool within =
+        inner.starts_with(outer) && (inner.size() == outer.size() || inner[outer.size()] == '.');
+    return place.empty() || within;
+  });
+}
+
 std::vector<Problem> read_toml(const Source& source, const Fields::Visit& visit) {
   const toml::parse_result parsed = toml::parse(source.text, source.file);
   Findings findings{source};
   if (parsed.failed()) {
-    findings.add(parsed.error().source().begin, std::string(parsed.error().description()));
+    findings.add(parsed.error().source().begin, std::string(parsed.error().description()), "");
     return findings.problems;
   }
   Reader reader(findings, parsed.table(), "");

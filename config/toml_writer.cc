@@ -72,6 +72,7 @@ class Writer : public Fields {
     line(key, fmt::format("[{}]", fmt::join(values, ", ")));
   }
   bool is_reading() const override { return false; }
+  bool is_sound() const override { return true; }
   void choice(const Key& key,
               std::size_t& index,
               std::span<const std::string_view> names) override {

@@ -188,6 +188,70 @@ TEST_F(SessionConfigTest, HoldsASimulatedSampleToTheOneThatIsSimulated) {
       ElementsAre("3:8: size: the simulated sample measures 24 x 24 x 6 mm"));
 }
 
+TEST_F(SessionConfigTest, FindsWhatTheRigCannotDoInOneGo) {
+  write("rig.toml",
+        "[sim.projector]\n"
+        "mm_per_pixel = 1.0\n"  // 24 pixels across the face
+        "offset_x_px = 20\n"
+        "[calibration.camera]\n"
+        "width = 320\n"
+        "height = 256\n");
+  const fs::path path = write("session.toml",
+                              "rig = \"rig.toml\"\n"
+                              "[capture]\n"
+                              "regions = 30\n"
+                              "[capture.exposures]\n"
+                              "longest = \"30 ms\"\n"
+                              "shortest = \"20 ms\"\n");
+  EXPECT_THAT(problems_of(path),
+              ElementsAre(AllOf(StartsWith("3:11: regions: "), HasSubstr("smaller than")),
+                          AllOf(StartsWith("5:11: longest: "), HasSubstr("colour wheel")),
+                          AllOf(StartsWith("5:9: width: "),
+                                HasSubstr("320 x 256 pixels of 12 bits"),
+                                HasSubstr("256 x 256"))));
+}
+
+TEST_F(SessionConfigTest, FindsAFaceThatTheDevicesDoNotReach) {
+  write("rig.toml",
+        "station.nmae = \"x\"\n"  // some other problem
+        "[sim.projector]\n"
+        "offset_x_px = 600\n"
+        "[sim.camera]\n"
+        "cx = 99999.0\n");
+  EXPECT_THAT(problems_of(write("session.toml",
+                                "rig = \"rig.toml\"\n"
+                                "[capture.exposures]\n"
+                                "ratio = 1.001\n"
+                                "[sample]\n"
+                                "seen_face = \"z_max\"\n"
+                                "size = [\"24 mm\", \"24 mm\", \"6 mm\"]\n")),
+              ElementsAre(AllOf(StartsWith("3:9: ratio: "), HasSubstr("64 exposures")),
+                          AllOf(StartsWith("5:13: seen_face: "), HasSubstr("sees nothing")),
+                          AllOf(StartsWith("6:8: size: "), HasSubstr("within its picture")),
+                          HasSubstr("unknown key \"nmae\"")));
+}
+
+TEST_F(SessionConfigTest, JudgesNothingByWhatTheRigSaysWrong) {
+  write("rig.toml",
+        "[sim.scene]\nsize = [\"30 mm\", \"30 mm\", 6]\n"
+        "[sim.projector]\nmm_per_pixel = -1\n[sim.camera]\ncy = \"9999\"\n");
+  EXPECT_THAT(problems_of(write("session.toml",
+                                "rig = \"rig.toml\"\n"
+                                "[sample]\nsize = [\"30 mm\", \"30 mm\", \"6 mm\"]\n"
+                                "lit_face = \"x_min\"\n")),
+              ElementsAre(StartsWith("4:12: lit_face: the simulated light enters by"),
+                          StartsWith("2:27: size is 6"),
+                          StartsWith("4:16: mm_per_pixel is -1"),
+                          StartsWith("6:6: cy is")));
+}
+
+TEST_F(SessionConfigTest, TakesASessionWithAStrayTableForASession) {
+  write("rig.toml", "");
+  EXPECT_THAT(
+      problems_of(write("session.toml", "rig = \"rig.toml\"\n[camera]\ndriver = \"sim\"\n")),
+      ElementsAre(AllOf(StartsWith("2:2: unknown key \"camera\""))));
+}
+
 TEST_F(SessionConfigTest, MakesPathsAbsoluteAndRefusesRelativeOnesInTexts) {
   fs::create_directory(directory_.path() / "photographs");
   const std::string rig =
