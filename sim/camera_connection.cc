@@ -108,7 +108,9 @@ void CameraConnection::connect(const std::array<double, 3>& point,
   }
   // The face opposite: the way down and up again is long; make it as seldom as it is dark.
   const double below = size_[normal_] - depth;
-  const double chance = std::exp(-2.0 * below * medium_.least_extinction);
+  const double thickness = 2.0 * below * medium_.least_extinction;
+  if (random * (1.0 + thickness) >= 1.0) return;  // e^-t <= 1 / (1 + t) spares most exponentials
+  const double chance = std::exp(-thickness);
   if (random >= chance) return;
   Image image{.point = point};
   image.point[normal_] = is_max(seen_) ? -point[normal_] : 2.0 * size_[normal_] - point[normal_];
@@ -178,9 +180,11 @@ double CameraConnection::transmittance(const std::array<double, 3>& from,
   double at = 0.0;
   while (true) {
     const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
-    const double extinction = medium_.extinction(folded_cell(cell));
-    if (next[axis] >= length) return std::exp(-(optical_depth + (length - at) * extinction));
-    optical_depth += (next[axis] - at) * extinction;
+    const double accept = medium_.voxels[folded_cell(cell)].accept;
+    if (next[axis] >= length) {
+      return std::exp(-medium_.majorant * (optical_depth + (length - at) * accept));
+    }
+    optical_depth += (next[axis] - at) * accept;
     at = next[axis];
     next[axis] += every[axis];
     cell[axis] += step[axis];

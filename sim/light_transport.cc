@@ -19,6 +19,9 @@ namespace {
 
 constexpr std::uint64_t kFewestBatches = 8;
 constexpr std::uint64_t kMostParts = 64;
+constexpr std::uint64_t kFewestParts = 8;
+constexpr std::size_t kMostPartBytes =
+    std::size_t{256} << 20;  // of all parts together, while there are more than that
 constexpr double kLeastOpticalThickness = 1e-3;
 
 /// Running sums of one quantity over batches, and of squares for the scatter between them.
@@ -108,12 +111,25 @@ PartSums trace_part(const BatchSetup& setup,
   return part;
 }
 
+/// How many parts: for large faces fewer, since each keeps sums of its own until all are done.
+std::uint64_t part_count(const Block& block,
+                         const TransportOptions& options,
+                         std::uint64_t batches) {
+  std::size_t cells = options.radiance ? block.face_cell_count(options.radiance->face) : 0;
+  for (const Face face : kFaces) {
+    if (options.tally_exitance) cells += block.face_cell_count(face);
+  }
+  const std::size_t part_bytes = 2 * sizeof(double) * (cells + kScalars);
+  return std::min(batches,
+                  std::clamp<std::uint64_t>(kMostPartBytes / part_bytes, kFewestParts, kMostParts));
+}
+
 /// The parts are the same for any number of threads; threads take the next one not taken.
 PartSums trace_parts(const BatchSetup& setup,
                      const TransportOptions& options,
                      std::uint64_t batches,
                      const std::stop_token& stop) {
-  const std::uint64_t parts = std::min(batches, kMostParts);
+  const std::uint64_t parts = part_count(setup.medium.block, options, batches);
   std::vector<std::optional<PartSums>> done(parts);
   std::atomic<std::uint64_t> next{0};
   const auto work = [&] {
@@ -289,7 +305,11 @@ Result<TransportTally> trace(const Block& block,
     thin_connections(medium, options.radiance->face);
     camera.emplace(medium, options.radiance->face, options.radiance->centre);
   }
-  const BatchSetup setup{medium, entry, options.count_unscattered, camera ? &*camera : nullptr};
+  const BatchSetup setup{.medium = medium,
+                         .entry = entry,
+                         .count_unscattered = options.count_unscattered,
+                         .camera = camera ? &*camera : nullptr,
+                         .stop = stop};
   const std::uint64_t batches = whole_batches(options.photons) / kBatchPhotons;
   const PartSums sums = trace_parts(setup, options, batches, stop);
   if (stop.stop_requested()) return cancelled("light transport was stopped");

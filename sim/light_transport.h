@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <stop_token>
+#include <string_view>
 
 #include "base/block.h"
 #include "base/events.h"
@@ -134,6 +135,10 @@ Result<PatchResponse> patch_response(const Material& material,
                                      int column,
                                      int row,
                                      std::stop_token stop);
+
+/// What writes responses: program and version of the estimate. A later program may give other numbers for the same
+/// seed (transport_key() knows); under the same name they agree within the noise.
+std::string_view transport_generator();
 
 /// Every patch, reporting progress as step "light transport". `scene` is only written down.
 Result<TransportResponses> compute_responses(const Material& material,

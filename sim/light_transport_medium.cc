@@ -52,7 +52,7 @@ void thin_connections(LightTransportMedium& medium, Face seen) {
         const double half = 0.5 * spacing * medium.extinction(cell);
         const double look = std::min(1.0, std::exp(-(optical_depth + half)) / kAlwaysLookAbove);
         optical_depth += 2.0 * half;
-        voxel.look = voxel.accept * static_cast<float>(look);
+        voxel.look = static_cast<float>(std::ceil(voxel.accept * look * 0x1p24) * 0x1p-24);
       }
     }
   }

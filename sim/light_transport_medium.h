@@ -8,12 +8,13 @@
 
 namespace opaline::sim {
 
-/// One voxel as a tentative collision sees it.
-struct VoxelOptics {
+/// One voxel as a tentative collision sees it; 16 bytes, which are read at once.
+struct alignas(16) VoxelOptics {
   float accept = 0.0F;  ///< sigma_t / majorant: probability that the collision is real
   float albedo = 0.0F;  ///< sigma_s / sigma_t
   float look = 0.0F;    ///< accept x probability that a real collision is connected to the camera
 };
+static_assert(sizeof(VoxelOptics) == 16);
 
 /// One channel of a block, prepared for delta tracking.
 struct LightTransportMedium {
@@ -35,7 +36,8 @@ LightTransportMedium make_medium(const Block& block,
                                  bool periodic_sides);
 
 /// Sets `look`: near the seen face always, deeper in proportion to the transmittance straight to
-/// the face, so that all connections made carry about the same light.
+/// the face, so that all connections made carry about the same light. A multiple of 2^-24, as the random numbers are
+/// that decide: what is divided by is then the chance there was, however small.
 void thin_connections(LightTransportMedium& medium, Face seen);
 
 }  // namespace opaline::sim

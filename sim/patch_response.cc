@@ -40,6 +40,8 @@ void average(Image<float>& to, const Image<float>& other, double weight, double 
 
 }  // namespace
 
+std::string_view transport_generator() { return kGenerator; }
+
 Result<void> validate(const ResponseOptions& options, const Material& material) {
   for (const int patches : {options.patches_x, options.patches_y}) {
     if (patches < 1 || patches > 256) {

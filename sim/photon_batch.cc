@@ -1,8 +1,8 @@
 #include "sim/photon_batch.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numbers>
 
@@ -12,6 +12,7 @@ namespace opaline::sim {
 namespace {
 
 constexpr double kRouletteSurvival = 0.1;
+constexpr unsigned kStepsBetweenLooks = 1024;  // at the stop token
 
 void clear_all(std::vector<double>& values) { std::fill(values.begin(), values.end(), 0.0); }
 
@@ -39,20 +40,18 @@ class PhotonBatch {
 
   void run() {
     for (int lane = 0; lane < kLanes; ++lane) emit(lane);
-    while (living_ > 0) {
-      setup_.step(constants_, lanes_);
-      std::array<std::uint64_t, kLanes / 2> any{};
-      std::memcpy(any.data(), lanes_.event.data(), sizeof(any));
-      if ((any[0] | any[1] | any[2] | any[3]) != 0) handle_events();
+    for (unsigned steps = 1; living_ > 0; ++steps) {
+      if (steps % kStepsBetweenLooks == 0 && setup_.stop.stop_requested()) return;
+      handle_events(setup_.step(constants_, lanes_));
     }
     for (const float absorbed : lanes_.absorbed) sums_.absorbed += absorbed;
   }
 
  private:
-  void handle_events() {
-    for (int lane = 0; lane < kLanes; ++lane) {
+  void handle_events(unsigned lanes) {
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
       const std::int32_t event = lanes_.event[lane];
-      if (event == 0) continue;
       if ((event & kSeen) != 0) connect(lane);
       if ((event & kAtBoundary) != 0) meet_boundary(lane);
       if ((event & kDim) != 0) play_roulette(lane);

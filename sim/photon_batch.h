@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "sim/camera_connection.h"
@@ -31,10 +32,12 @@ struct BatchSetup {
   bool count_unscattered = false;
   const CameraConnection* camera = nullptr;  ///< null: no radiance
   StepFunction step = best_step_function();
+  std::stop_token stop =
+      {};  ///< looked at every thousand steps: a batch of trapped photons may take minutes
 };
 
 /// Follows kBatchPhotons photons with random numbers that depend on `key` alone and adds what they
-/// do to `sums`, whose vectors have their sizes. Threads: separate sums, any threads.
+/// do to `sums`, whose vectors have their sizes. Once stopped, what it has added is worth nothing. Threads: separate sums, any threads.
 void trace_batch(const BatchSetup& setup, std::uint64_t key, BatchSums& sums);
 
 }  // namespace opaline::sim

@@ -69,8 +69,9 @@ struct StepConstants {
 
 /// One tentative flight of every living lane, ending at an accepted collision (scattered into a new
 /// direction), at a rejected one, or beyond the boundary (then nothing moves and the event says
-/// so). Uses AVX2 where the processor has it; both give the same bits.
-using StepFunction = void (*)(const StepConstants&, PhotonLanes&);
+/// so). Bit l of what it returns is set when lane l has an event. Uses AVX2 where the processor has it; both give the
+/// same results, bit by bit.
+using StepFunction = unsigned (*)(const StepConstants&, PhotonLanes&);
 StepFunction best_step_function();
 StepFunction portable_step_function();
 

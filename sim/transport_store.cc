@@ -19,7 +19,7 @@
 namespace opaline::sim {
 namespace {
 
-constexpr int kAlgorithm = 1;  // raise it when the same options give other numbers
+constexpr int kAlgorithm = 2;  // raise it when the same options give other numbers
 constexpr std::chrono::milliseconds kLockPoll{200};
 
 /// What is asked for agrees with what a file holds; the file may have more photons and any seed.
@@ -27,8 +27,8 @@ bool serves(const TransportResponses& responses,
             const SceneOptions& scene,
             const ResponseOptions& options) {
   const auto described = scene_from_json(responses.scene);
-  return described && *described == scene && responses.lit_face == options.lit_face &&
-         responses.seen_face == options.seen_face &&
+  return described && *described == scene && responses.generator == transport_generator() &&
+         responses.lit_face == options.lit_face && responses.seen_face == options.seen_face &&
          responses.diffuse_entry == options.diffuse_entry &&
          responses.patches_x == options.patches_x && responses.patches_y == options.patches_y &&
          length(responses.camera_centre - options.camera_centre) < 1e-6 &&
@@ -64,15 +64,16 @@ std::filesystem::path default_cache() {
   return std::filesystem::temp_directory_path() / "opaline-transport";
 }
 
-/// Waits while another process computes the same.
-Result<FileLock> wait_for_lock(const std::filesystem::path& path,
-                               EventSink& events,
-                               const std::stop_token& stop) {
+/// The right to compute a file of the cache; waits while another process computes the same.
+Result<FileLock> lock_entry(const std::filesystem::path& path,
+                            EventSink& events,
+                            const std::stop_token& stop) {
+  if (auto made = system_files().make_directories(path.parent_path()); !made) return made.error();
   std::mutex mutex;
   std::condition_variable_any stopped;
   std::unique_lock guard(mutex);
   while (true) {
-    auto lock = FileLock::acquire(path);
+    auto lock = FileLock::acquire(path.string() + ".lock");
     if (lock || lock.error().code != ErrorCode::kBusy) return lock;
     events.progress({.step = "light transport",
                      .fraction = 0.0,
@@ -128,14 +129,16 @@ Result<TransportResponses> load_or_compute(const SceneOptions& scene,
 
   const std::filesystem::path path = cache_file(store, transport_key(scene, options));
   if (auto cached = from_cache(path, scene, options)) return *std::move(cached);
-  if (auto made = system_files().make_directories(path.parent_path()); !made) return made.error();
-  auto lock = wait_for_lock(path.string() + ".lock", events, stop);
-  if (!lock) return lock.error();
+  auto lock = lock_entry(path, events, stop);
+  if (!lock) {
+    if (lock.error().code == ErrorCode::kCancelled) return lock.error();
+    log::warning("light transport is computed, but may not be kept: {}", lock.error().message);
+  }
   if (auto cached = from_cache(path, scene, options)) return *std::move(cached);
   auto responses = compute_responses(*material, options, to_json(scene), events, stop);
   if (!responses) return responses.error();
   if (auto written = write_transport(system_files(), path, *responses); !written) {
-    return written.error();
+    log::warning("light transport is computed, but not kept: {}", written.error().message);
   }
   return responses;
 }

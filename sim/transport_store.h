@@ -26,12 +26,13 @@ std::string transport_key(const SceneOptions& scene, const ResponseOptions& opti
 std::filesystem::path cache_file(const StoreOptions& store, const std::string& key);
 
 /// The responses for a scene: from the committed file when its scene, geometry and camera are those
-/// asked for and it has at least as many photons; else from the cache; else computed, with
-/// progress, and put there whole. Two processes that want the same do not compute it twice: the
+/// asked for, it was made by this program's method (transport_generator()) and it has at least as
+/// many photons; else from the cache; else computed, with progress, and put there whole. Two processes that want the same do not compute it twice: the
 /// second waits for the first and reads its file.
 ///
-/// A damaged cached file is computed again; a damaged committed one is an error.
-/// Errors: kInvalidArgument, kCancelled, kUnavailable (disk).
+/// A damaged cached file is computed again; a damaged committed one is an error. A cache that cannot be written, or
+/// locked, is a warning and not an error: what took an hour to compute is returned all the same.
+/// Errors: kInvalidArgument, kCancelled, kUnavailable (the committed file).
 Result<TransportResponses> load_or_compute(const SceneOptions& scene,
                                            const ResponseOptions& options,
                                            const StoreOptions& store,

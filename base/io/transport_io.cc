@@ -148,9 +148,12 @@ Result<TransportResponses> responses_from_header(const nlohmann::json& json) {
   r.scene = json.at("scene").get<std::string>();
   const bool sane =
       std::all_of(cells.begin(), cells.end(), [](int n) { return n >= 1 && n <= 4096; }) &&
-      std::all_of(spacing.begin(), spacing.end(), [](double h) { return h > 0.0; }) &&
+      std::all_of(spacing.begin(), spacing.end(), [](double h) { return h > 0.0 && h <= 1e6; }) &&
       r.patches_x >= 1 && r.patches_x <= 256 && r.patches_y >= 1 && r.patches_y <= 256;
   if (!sane) return invalid_argument("impossible sizes in its header");
+  const bool possible = r.ior >= 1.0 && r.ior <= 3.0 && std::abs(r.anisotropy) < 1.0 &&
+                        r.passes >= 1 && std::isfinite(length(r.camera_centre));
+  if (!possible) return invalid_argument("impossible optics or passes in its header");
   return r;
 }
 

@@ -9,6 +9,7 @@
 
 #include "sim/fresnel.h"
 #include "sim/light_transport.h"
+#include "sim/photon_lanes.h"
 
 namespace opaline::sim {
 namespace {
@@ -38,7 +39,8 @@ Powers measure(const Block& block,
                double ior,
                const ChannelCoefficients& coefficients,
                TransportOptions options,
-               std::span<const double> azimuths) {
+               std::span<const double> azimuths,
+               Face lit = Face::kZMin) {
   constexpr std::array nodes{
       0.0337652429, 0.1693953068, 0.3806904070, 0.6193095930, 0.8306046932, 0.9662347571};
   constexpr std::array weights{
@@ -52,8 +54,7 @@ Powers measure(const Block& block,
       options.radiance =
           RadianceTally{Face::kZMax, camera_towards(block, std::sqrt(nodes[i]), azimuth)};
       ++options.stream;
-      const auto tally =
-          trace(block, ior, coefficients, whole_face(block, Face::kZMin), options, {});
+      const auto tally = trace(block, ior, coefficients, whole_face(block, lit), options, {});
       EXPECT_TRUE(tally);
       const double scale = weight * block.face_cell_area(Face::kZMax);
       for (std::size_t cell = 0; cell < tally->radiance.mean.samples().size(); ++cell) {
@@ -95,6 +96,33 @@ TEST(CameraConnection, RadianceOfASmallBlockIntegratesToItsExitanceSidesIncluded
   const std::array azimuths{std::numbers::pi / 16, 3 * std::numbers::pi / 16};
   const TransportOptions options{.photons = 1 << 17};
   expect_equal(measure(block, 1.3, uniform(block, 0.02, 2.0), options, azimuths), 1e-3);
+}
+
+TEST(CameraConnection, RadianceOfAMixedBlockIntegratesToItsExitance) {
+  // Every voxel another material, up to four times as dense as its neighbour. Nothing is symmetric: all azimuths.
+  const Block block{4, 4, 4, 0.75, 0.75, 0.75};
+  SplitMix random(5);
+  ChannelCoefficients mixed = uniform(block, 0.0, 0.0);
+  for (std::size_t i = 0; i < block.cell_count(); ++i) {
+    const double density = std::pow(4.0, random.uniform());
+    mixed.absorption[i] = 0.02 * density * random.uniform();
+    mixed.reduced_scattering[i] = density;
+  }
+  std::array<double, 12> azimuths{};
+  for (std::size_t i = 0; i < azimuths.size(); ++i) {
+    azimuths[i] = 2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / azimuths.size();
+  }
+  const TransportOptions options{.photons = 1 << 15};
+  expect_equal(measure(block, 1.3, mixed, options, azimuths), 1e-3);
+}
+
+TEST(CameraConnection, RadianceOfTheLitFaceIntegratesToItsExitance) {
+  // Lit from in front: most of what is seen has scattered once or twice, right under the face.
+  const Block block{4, 4, 4, 0.75, 0.75, 0.75};
+  const std::array azimuths{std::numbers::pi / 16, 3 * std::numbers::pi / 16};
+  const TransportOptions options{.photons = 1 << 17};
+  expect_equal(measure(block, 1.3, uniform(block, 0.02, 2.0), options, azimuths, Face::kZMax),
+               2e-3);
 }
 
 TEST(CameraConnection, TurnedBy40DegreesSeesAnotherPicture) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 
@@ -47,16 +49,27 @@ TEST(DemoTransport, IsTheDemosSampleLitFromBehindInEightByEightPatches) {
   EXPECT_LT(length(demo->camera_centre - camera_above(demo->block, 300.0, 10.0)), 1e-9);
 }
 
+/// Another one every time, for a test whose subject is to be random; printed, so that a failure can be had again.
+std::uint64_t random_seed() {
+  const char* given = std::getenv("OPALINE_TEST_SEED");
+  const auto seed =
+      given != nullptr
+          ? std::strtoull(given, nullptr, 10)
+          : static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+  std::printf("OPALINE_TEST_SEED=%llu\n", static_cast<unsigned long long>(seed));
+  return seed;
+}
+
 TEST(DemoTransport, OnePatchComputedAfreshIsTheSameWithinNoise) {
   const auto demo = read_transport(demo_file());
   ASSERT_TRUE(demo);
   const auto material = make_material(*scene_from_json(demo->scene));
-  SplitMix random(20261122);
+  SplitMix random(random_seed());
   const int column = static_cast<int>(random.next() % 8);
   const int row = static_cast<int>(random.next() % 8);
   ResponseOptions options = options_of(*demo);
   options.photons_per_patch = 1 << 17;
-  options.seed = demo->seed + 1'000'000;  // of none of its passes
+  options.seed = demo->seed + 1'000'000 + random.next() % 1'000'000'000;  // of none of its passes
   const auto fresh = patch_response(*material, options, column, row, {});
   ASSERT_TRUE(fresh);
   const PatchResponse& stored = demo->patch(column, row);
@@ -76,10 +89,11 @@ TEST(DemoTransport, OnePatchComputedAfreshIsTheSameWithinNoise) {
         difference * difference / (stored.variance.samples()[i] + fresh->variance.samples()[i]);
     ++count;
   }
-  // Some 1500 cells: a standard deviation of 0.04 if they were independent, twice that as a photon is seen in several.
-  EXPECT_GT(count, 1000);
-  EXPECT_NEAR(chi_squared / count, 1.0, 0.3);
-  EXPECT_NEAR(fresh_light / light, 1.0, 0.02);  // of the fresh sum: 0.6 %
+  // Over 300 seeds chi^2 per cell was 1.10 with a standard deviation of 0.05 (the fresh variances come from 32 batches,
+  // which alone makes it 31/29), the fresh sum right within 0.44 %: a false alarm is seven deviations away.
+  EXPECT_GT(count, 500);
+  EXPECT_NEAR(chi_squared / count, 1.1, 0.35);
+  EXPECT_NEAR(fresh_light / light, 1.0, 0.03);
 }
 
 TEST(DemoTransport, RegionsOfFourPatchesAreKnownToBetterThanAPercent) {

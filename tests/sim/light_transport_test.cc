@@ -54,7 +54,7 @@ TEST(LightTransport, MeetsVanDeHulstsForwardScatteringSlab) {
       trace_slab(block,
                  1.0,
                  uniform(block, 1.0, 9.0 * 0.25),
-                 {.photons = 1 << 20, .anisotropy = 0.75, .count_unscattered = true});
+                 {.photons = 1 << 23, .anisotropy = 0.75, .count_unscattered = true});
   expect_close(tally.escaped[kZMinIndex], 1.0, 0.09739, 5e-6);
   expect_close(tally.escaped[kZMaxIndex], 1.0, 0.66096, 5e-6);
 }
@@ -65,6 +65,34 @@ TEST(LightTransport, MeetsGiovanellisHalfSpaceWithAReflectingSurface) {
       trace_slab(block, 1.5, uniform(block, 1.0, 9.0), {.photons = 1 << 19});
   EXPECT_NEAR(tally.specular.mean, 0.04, 1e-12);
   expect_close(tally.escaped[kZMinIndex], 1.0, 0.2600 - 0.04, 5e-5);
+}
+
+TEST(LightTransport, MeetsHeasletAndWarmingForDiffuseLight) {
+  // Diffuse light on a conservative, isotropic slab is the radiation between black plates: T = 0.5532 and 0.3900 at an
+  // optical thickness of 1 and 2 (Heaslet & Warming 1965).
+  for (const auto& [thickness, transmitted] : {std::pair{1.0, 0.5532}, std::pair{2.0, 0.3900}}) {
+    const Block block{1, 1, 1, 1.0, 1.0, thickness};
+    const TransportTally tally = trace_slab(block,
+                                            1.0,
+                                            uniform(block, 0.0, 1.0),
+                                            {.photons = 1 << 20, .count_unscattered = true},
+                                            true);
+    expect_close(tally.escaped[kZMaxIndex], 1.0, transmitted, 5e-5);
+    expect_close(tally.escaped[kZMinIndex], 1.0, 1.0 - transmitted, 5e-5);
+  }
+}
+
+TEST(LightTransport, ReflectsDiffuseLightAtEntryAsFresnelsEquationsIntegrate) {
+  const Block block{1, 1, 1, 1.0, 1.0, 1.0};
+  const TransportTally tally =
+      trace_slab(block, 1.5, uniform(block, 1.0, 1.0), {.photons = 1 << 18}, true);
+  constexpr int kSteps = 100'000;  // of the midpoint rule, in cos^2: 2 mu d(mu) = d(mu^2)
+  double integral = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    integral += reflectance(std::sqrt((i + 0.5) / kSteps), 1.0, 1.5) / kSteps;
+  }
+  EXPECT_NEAR(integral, 0.0918, 5e-5);  // as tables have it
+  expect_close(tally.specular, 1.0, integral, 1e-6);
 }
 
 TEST(LightTransport, MeetsDiscreteOrdinatesForSlabsOfTheDemosMaterial) {
@@ -249,6 +277,59 @@ TEST(LightTransport, StepsAlikeWithAndWithoutWideVectors) {
   trace_batch({.medium = medium, .entry = entry, .step = portable_step_function()}, 7, portable);
   EXPECT_EQ(wide.absorbed, portable.absorbed);
   EXPECT_EQ(wide.escaped, portable.escaped);
+}
+
+TEST(LightTransport, StepsAlikeTowardsACameraToo) {
+  const Block block{2, 3, 4, 0.5, 0.6, 0.7};
+  LightTransportMedium medium = make_medium(block, 1.3, uniform(block, 0.1, 2.0), 0.0, false);
+  thin_connections(medium, Face::kZMax);
+  const CameraConnection camera(medium, Face::kZMax, camera_above(block, 50.0, 20.0));
+  const LightEntry entry = whole_face(block, Face::kZMin);
+  BatchSums wide;
+  BatchSums portable;
+  wide.radiance.resize(6);
+  portable.radiance.resize(6);
+  trace_batch({.medium = medium, .entry = entry, .camera = &camera}, 7, wide);
+  trace_batch(
+      {.medium = medium, .entry = entry, .camera = &camera, .step = portable_step_function()},
+      7,
+      portable);
+  EXPECT_GT(wide.radiance[0], 0.0);
+  EXPECT_EQ(wide.radiance, portable.radiance);
+  EXPECT_EQ(wide.escaped, portable.escaped);
+}
+
+TEST(LightTransport, ConnectsWithAChanceThatItsRandomNumbersCanHave) {
+  // They have 24 bits. Deep in a thick block, where a connection carries e^-70 of the light, the chance is one of them.
+  const Block block{1, 1, 4, 1.0, 1.0, 5.0};
+  const ChannelCoefficients layers{{0.0, 1.0, 0.0, 0.0}, {3.0, 1.0, 0.3, 4.0}};
+  LightTransportMedium medium = make_medium(block, 1.3, layers, 0.0, false);
+  thin_connections(medium, Face::kZMax);
+  for (const VoxelOptics& voxel : medium.voxels) {
+    const double steps = voxel.look * 0x1p24;
+    EXPECT_GE(steps, 1.0);
+    EXPECT_EQ(steps, std::floor(steps));
+  }
+}
+
+TEST(LightTransport, StopsInTheMiddleOfABatch) {
+  // Trapped: some 10^7 steps a photon, thousands of photons a batch.
+  const Block block{1, 1, 1, 8.0, 8.0, 8.0};
+  std::stop_source stop;
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    stop.request_stop();
+  });
+  const auto start = std::chrono::steady_clock::now();
+  const auto tally = trace(block,
+                           3.0,
+                           uniform(block, 0.0, 1000.0),
+                           whole_face(block, Face::kZMin, true),
+                           {.photons = 1, .threads = 1},
+                           stop.get_token());
+  ASSERT_FALSE(tally);
+  EXPECT_EQ(tally.error().code, ErrorCode::kCancelled);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
 }
 
 TEST(LightTransport, StopsSoonWhenAsked) {

@@ -83,6 +83,27 @@ TEST_F(TransportStore, TakesACommittedFileThatServes) {
   EXPECT_TRUE(computed());
 }
 
+TEST_F(TransportStore, TakesNoCommittedFileOfAnotherMethod) {
+  auto responses = load();
+  ASSERT_TRUE(responses);
+  std::filesystem::remove(cached());
+  responses->generator = "a fast approximation";
+  store_.committed = directory_.path() / "committed.transport";
+  ASSERT_TRUE(write_transport(system_files(), store_.committed, *responses));
+  const auto loaded = load();
+  ASSERT_TRUE(loaded);
+  EXPECT_TRUE(computed());
+  EXPECT_EQ(loaded->generator, transport_generator());
+}
+
+TEST_F(TransportStore, ReturnsWhatItComputedThoughTheCacheCannotBeWritten) {
+  std::ofstream(store_.cache) << "a file where the directory should be";
+  const auto loaded = load();
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_TRUE(computed());
+  EXPECT_EQ(loaded->patches.size(), 2);
+}
+
 TEST_F(TransportStore, RefusesADamagedCommittedFile) {
   store_.committed = directory_.path() / "committed.transport";
   std::ofstream(store_.committed) << "opaline transport 1\n{";

@@ -84,6 +84,21 @@ TEST(TransportIo, RefusesToWritePicturesThatAreMissing) {
   EXPECT_FALSE(encode_transport(responses));
 }
 
+TEST(TransportIo, RefusesWhatNoRunCanHaveWritten) {
+  const auto refused = [](auto change) {
+    TransportResponses responses = example();
+    change(responses);
+    const auto bytes = encode_transport(responses);
+    return bytes && !decode_transport(*bytes);
+  };
+  EXPECT_FALSE(refused([](TransportResponses&) {}));
+  EXPECT_TRUE(refused([](TransportResponses& r) { r.passes = 0; }));
+  EXPECT_TRUE(refused([](TransportResponses& r) { r.block.hx = 1e300; }));
+  EXPECT_TRUE(refused([](TransportResponses& r) { r.ior = 0.5; }));
+  EXPECT_TRUE(refused([](TransportResponses& r) { r.anisotropy = 1.0; }));
+  EXPECT_TRUE(refused([](TransportResponses& r) { r.camera_centre.x = 1e300; }));
+}
+
 TEST(TransportIo, SaysThatAFileIsNotThere) {
   const auto read = read_transport(std::filesystem::path(testing::TempDir()) / "no.transport");
   ASSERT_FALSE(read);
