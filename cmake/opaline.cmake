@@ -30,7 +30,7 @@ if(OPALINE_SANITIZE)
 endif()
 
 # opaline_library(NAME SOURCES a.cc ... USES lower_library ... LINK third::party ...)
-# USES is the layer: what this library's files may include (tests/layering_test.cc reads them all).
+# USES is the layer; tests/layering_test.cc holds it, and every #include, against the table of docs/architecture.md.
 # LINK is private to the library; a third party that a header shows goes under PUBLIC_LINK.
 function(opaline_library name)
   cmake_parse_arguments(A "" "" "SOURCES;USES;LINK;PUBLIC_LINK" ${ARGN})
