@@ -2,13 +2,10 @@
 
 #include <algorithm>
 
+#include "daemon/json_text.h"
+
 namespace opaline::daemon {
 namespace {
-
-std::string text_of(const nlohmann::json& data, const char* key) {
-  const auto it = data.is_object() ? data.find(key) : data.end();
-  return data.is_object() && it != data.end() && it->is_string() ? it->get<std::string>() : "";
-}
 
 StageState ended_as(const nlohmann::json& data) {
   const std::string outcome = text_of(data, "outcome");

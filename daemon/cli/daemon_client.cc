@@ -7,6 +7,8 @@
 #include <mutex>
 #include <utility>
 
+#include "daemon/json_text.h"
+
 namespace opaline::daemon {
 namespace {
 
@@ -99,10 +101,13 @@ ErrorCode code_named(const std::string& name) {
 
 Result<nlohmann::json> parsed(long status, const std::string& text) {
   auto json = nlohmann::json::parse(text, nullptr, false);
-  if (status < 300 && json.is_discarded()) return internal_error("the daemon's answer is no JSON");
+  if (status < 300 && !json.is_object()) {
+    return internal_error("the daemon's answer is no JSON object; is it another program?");
+  }
   if (status < 300) return json;
   if (!json.is_object()) return internal_error(fmt::format("the daemon answered {}", status));
-  return Error{code_named(json.value("code", "")), json.value("detail", "the daemon refused")};
+  const std::string detail = text_of(json, "detail");
+  return Error{code_named(text_of(json, "code")), detail.empty() ? "the daemon refused" : detail};
 }
 
 Result<nlohmann::json> ask(Request& request, const DaemonAddress& address, std::string& text) {

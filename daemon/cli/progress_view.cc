@@ -8,15 +8,12 @@
 #include <cstdio>
 #include <vector>
 
+#include "daemon/json_text.h"
+
 namespace opaline::daemon {
 namespace {
 
 constexpr std::chrono::seconds kPlainPeriod{2};
-
-std::string text_of(const nlohmann::json& object, const char* key) {
-  const auto it = object.find(key);
-  return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
-}
 
 std::string figure(const nlohmann::json& value) {
   if (value.is_string()) return value.get<std::string>();

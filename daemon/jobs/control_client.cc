@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/unix_socket.h"
+#include "daemon/json_text.h"
 
 namespace opaline::daemon {
 namespace {
@@ -51,9 +52,10 @@ ErrorCode code_named(const std::string& name) {
 Result<nlohmann::json> checked(const std::string& line) {
   auto answer = nlohmann::json::parse(line, nullptr, false);
   if (!answer.is_object()) return internal_error("the job's answer is no JSON object");
-  if (answer.value("ok", false)) return answer;
-  const auto error = answer.value("error", nlohmann::json::object());
-  return Error{code_named(error.value("code", "")), error.value("message", "the job refused")};
+  if (answer.contains("ok") && answer["ok"] == true) return answer;
+  const nlohmann::json error = answer.contains("error") ? answer["error"] : nlohmann::json();
+  const std::string message = text_of(error, "message");
+  return Error{code_named(text_of(error, "code")), message.empty() ? "the job refused" : message};
 }
 
 }  // namespace
