@@ -17,13 +17,12 @@
 #include "daemon/runtime_paths.h"
 #include "daemon/session_rules.h"
 #include "daemon/station.h"
+#include "daemon/token_file.h"
 
 namespace {
 
 using namespace opaline;          // NOLINT(google-build-using-namespace)
 using namespace opaline::daemon;  // NOLINT(google-build-using-namespace)
-
-constexpr std::size_t kTokenLimit = 4096;
 
 struct Arguments {
   Station::Options station{default_sessions(), program_directory()};
@@ -48,8 +47,8 @@ void declare(CLI::App& app, Arguments& arguments) {
       "Unix socket; default $OPALINE_SOCKET or opaline/opalined.sock in the runtime directory");
   app.add_option("--token-file",
                  arguments.token_file,
-                 "File with the token that every request over HTTP must bring; without one only "
-                 "loopback addresses are served")
+                 "File with the token that every request over HTTP must bring, for this user's "
+                 "eyes only; without one only loopback addresses are served")
       ->check(CLI::ExistingFile);
   app.add_option(
          "--programs", arguments.station.programs, "Directory of opaline-capture and its siblings")
@@ -59,16 +58,6 @@ void declare(CLI::App& app, Arguments& arguments) {
       "Examples:\n  opalined --sessions ~/sessions\n  opalined --listen 0.0.0.0 --token-file "
       "/etc/opaline/token\n  curl --unix-socket $XDG_RUNTIME_DIR/opaline/opalined.sock "
       "http://localhost/v1/status");
-}
-
-Result<void> read_token(const std::filesystem::path& file, std::string& token) {
-  if (file.empty()) return ok();
-  const Result<std::string> text = read_text(file, kTokenLimit);
-  if (!text) return text.error();
-  token = text->substr(0, text->find_first_of("\r\n"));
-  if (token.size() < 16)
-    return invalid_argument(file.string() + ": a token has 16 characters or more");
-  return ok();
 }
 
 void announce(const HttpServer& server, const Arguments& arguments) {
@@ -90,7 +79,11 @@ Result<void> serve(Arguments& arguments) {
     if (!socket) return socket.error();
     arguments.http.socket = *socket;
   }
-  if (auto read = read_token(arguments.token_file, arguments.http.token); !read) return read;
+  if (!arguments.token_file.empty()) {
+    const Result<std::string> token = read_token(arguments.token_file);
+    if (!token) return token.error();
+    arguments.http.token = *token;
+  }
   arguments.station.root = std::filesystem::absolute(arguments.station.root);
   const auto station = Station::create(arguments.station, {contents_of, station_lock_of});
   if (!station) return station.error();

@@ -2,8 +2,9 @@
 
 #include <filesystem>
 
+#include "base/result.h"
 #include "base/session_directory.h"
-#include "daemon/station.h"
+#include "daemon/new_session.h"
 
 namespace opaline::daemon {
 

@@ -11,18 +11,10 @@
 #include "base/lock.h"
 #include "daemon/catalogue.h"
 #include "daemon/executor.h"
+#include "daemon/new_session.h"
 #include "daemon/supervisor.h"
 
 namespace opaline::daemon {
-
-/// A wish for a session, as it came in.
-struct NewSession {
-  std::string name;  ///< for people; empty: the configuration's
-  std::string session_toml;
-  std::string rig_toml;
-  std::string resolved_toml;  ///< both with every default filled in; empty: to be worked out
-  bool same_user = false;     ///< of this user's own socket, who may name any file
-};
 
 /// Everything that opalined serves: the sessions in one directory, and what is done with them. A
 /// route calls one method of it. Thread-safe.

@@ -104,8 +104,7 @@ TEST_F(Hostile, RefusesOtherSitesPages) {
 }
 
 TEST_F(Hostile, AsksForTheTokenWhenThereIsOne) {
-  std::ofstream(root_.path() / "token") << "0123456789abcdef\n";
-  start({"--token-file", (root_.path() / "token").string()});
+  start({"--token-file", token_file()});
 
   EXPECT_EQ(ask_tcp("GET", "/v1/sessions").status, 401);
   EXPECT_EQ(ask_tcp("GET", "/v1/sessions", "", "Authorization: Bearer 0123456789abcdeg\r\n").status,
@@ -119,6 +118,27 @@ TEST_F(Hostile, ListensToOthersOnlyWithAToken) {
       "opalined", {"--sessions", sessions_.string(), "--listen", "0.0.0.0", "--port", "0"}, "out");
   EXPECT_EQ(daemon->wait(), 2);
   EXPECT_THAT(daemon->output(), HasSubstr("token"));
+}
+
+TEST_F(Hostile, ListensToOthersWithAToken) {
+  start({"--listen", "0.0.0.0", "--token-file", token_file()});
+  const std::string foreign = "Host: station.example\r\n";
+
+  EXPECT_EQ(ask_tcp("GET", "/v1/sessions", "", foreign).status, 401);
+  EXPECT_EQ(
+      ask_tcp("GET", "/v1/sessions", "", foreign + "Authorization: Bearer 0123456789abcdef\r\n")
+          .status,
+      200);
+}
+
+TEST_F(Hostile, RefusesATokenThatOthersCanRead) {
+  const std::string file = token_file();
+  std::filesystem::permissions(file, std::filesystem::perms(0644));
+  const auto daemon = spawn(
+      "opalined", {"--sessions", sessions_.string(), "--port", "0", "--token-file", file}, "out");
+
+  EXPECT_EQ(daemon->wait(), 2);
+  EXPECT_THAT(daemon->output(), HasSubstr("chmod 600"));
 }
 
 TEST_F(Hostile, ServesOthersWhileManyConnectionsSayNothing) {

@@ -50,12 +50,18 @@ class OpalinedTest : public ::testing::Test {
     daemon_ = spawn("opalined", arguments, "opalined.out");
     ASSERT_TRUE(eventually([&] { return port() != 0; })) << daemon_->output();
   }
-  // Printed as "http://127.0.0.1:PORT".
+  // Printed as "http://ADDRESS:PORT".
   std::uint16_t port() const {
     const std::string output = daemon_->output();
-    const std::size_t colon = output.find("http://127.0.0.1:");
-    if (colon == std::string::npos || output.find('\n', colon) == std::string::npos) return 0;
-    return static_cast<std::uint16_t>(std::stoi(output.substr(colon + 17)));
+    const std::size_t scheme = output.find("http://");
+    if (scheme == std::string::npos || output.find('\n', scheme) == std::string::npos) return 0;
+    return static_cast<std::uint16_t>(std::stoi(output.substr(output.find(':', scheme + 7) + 1)));
+  }
+  std::string token_file() const {
+    const std::filesystem::path file = root_.path() / "token";
+    std::ofstream(file) << "0123456789abcdef\n";
+    std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+    return file.string();
   }
   void turn_on(const std::string& what, const std::string& text = "") const {
     std::ofstream(switches_ / what) << text;
