@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,16 +17,25 @@
 #include "daemon/cli/run.h"
 #include "daemon/executor.h"
 #include "daemon/jobs/version.h"
+#include "daemon/json_text.h"
 #include "daemon/runtime_paths.h"
 #include "daemon/session_factory.h"
 #include "daemon/session_rules.h"
+#include "daemon/token_file.h"
 
 namespace {
 
 using namespace opaline;          // NOLINT(google-build-using-namespace)
 using namespace opaline::daemon;  // NOLINT(google-build-using-namespace)
 
-enum Exit : int { kDone = 0, kFailed = 1, kBadInput = 2, kCancelledByUser = 3, kBusyNow = 4 };
+enum Exit : int {
+  kDone = 0,
+  kFailed = 1,
+  kBadInput = 2,
+  kCancelledByUser = 3,
+  kBusyNow = 4,
+  kLeft = 5,  // no longer followed, and not over
+};
 
 struct Arguments {
   DaemonAddress daemon;
@@ -32,6 +43,7 @@ struct Arguments {
   std::vector<std::filesystem::path> files;
   std::string id;
   std::string name;
+  std::filesystem::path token_file;
   std::filesystem::path sessions = default_sessions();
   std::filesystem::path programs = program_directory();
   bool local = false;
@@ -52,8 +64,17 @@ int report(const Error& error) {
   }
 }
 
-int report(const Result<Ending>& ending) {
+bool is_over_named(const std::string& state) {
+  return state == "succeeded" || state == "failed" || state == "cancelled";
+}
+
+// `go_on`: how somebody who left goes on with the session.
+int report(const Result<Ending>& ending, const std::string& go_on) {
   if (!ending) return report(ending.error());
+  if (!is_over_named(ending->state)) {
+    fmt::print("{}\n", go_on);
+    return kLeft;
+  }
   const std::filesystem::path page = ending->directory / "report.html";
   std::error_code none;
   fmt::print("session  {}\n", ending->directory.string());
@@ -63,18 +84,34 @@ int report(const Result<Ending>& ending) {
   return ending->state == "cancelled" ? kCancelledByUser : kFailed;
 }
 
+int follow(const Arguments& arguments, const std::string& id, OnInterrupt on_interrupt) {
+  return report(follow_session(arguments.daemon, id, on_interrupt),
+                fmt::format("session {0} goes on: \"opaline watch {0}\" shows it, \"opaline cancel "
+                            "{0}\" stops it",
+                            id));
+}
+
+int run_local(const Arguments& arguments, const SessionDirectory& session) {
+  const std::string directory = session.path().string();
+  fmt::print("session  {}\n", directory);
+  std::fflush(stdout);
+  return report(run_locally(session, arguments.programs, station_lock_of(session)),
+                fmt::format("left; go on with \"opaline resume --local {}\"", directory));
+}
+
+int make_local(const Arguments& arguments, const SessionDirectory::Contents& contents) {
+  const std::filesystem::path root = std::filesystem::absolute(arguments.sessions);
+  if (auto made = system_files().make_directories(root); !made) return report(made.error());
+  const auto session = make_session(system_files(), root, contents);
+  return session ? run_local(arguments, *session) : report(session.error());
+}
+
 // The files are read here, and their texts sent: the daemon opens none of ours.
 int run(const Arguments& arguments) {
   Result<SessionDirectory::Contents> contents = config::read_contents(arguments.config);
   if (!contents) return report(contents.error());
   if (!arguments.name.empty()) contents->name = arguments.name;
-  if (arguments.local) {
-    const std::filesystem::path root = std::filesystem::absolute(arguments.sessions);
-    if (auto made = system_files().make_directories(root); !made) return report(made.error());
-    const auto session = make_session(system_files(), root, *contents);
-    if (!session) return report(session.error());
-    return report(run_locally(*session, arguments.programs, station_lock_of(*session)));
-  }
+  if (arguments.local) return make_local(arguments, *contents);
   const auto created = DaemonClient(arguments.daemon)
                            .post("/v1/sessions",
                                  {{"name", contents->name},
@@ -82,8 +119,17 @@ int run(const Arguments& arguments) {
                                   {"rig", contents->rig_toml},
                                   {"resolved", contents->resolved_toml}});
   if (!created) return report(created.error());
-  fmt::print("session  {}\n", created->value("id", ""));
-  return report(follow_session(arguments.daemon, created->value("id", "")));
+  const std::string id = text_of(*created, "id");
+  if (id.empty()) return report(internal_error("the daemon's answer names no session"));
+  fmt::print("session  {}\n", id);
+  return follow(arguments, id, OnInterrupt::kCancel);
+}
+
+int resume_local(const Arguments& arguments) {
+  const auto session = SessionDirectory::open(std::filesystem::absolute(arguments.id));
+  if (!session) return report(session.error());
+  if (auto resumed = resume_locally(*session); !resumed) return report(resumed.error());
+  return run_local(arguments, *session);
 }
 
 int check(const Arguments& arguments) {
@@ -103,13 +149,18 @@ int check(const Arguments& arguments) {
 }
 
 void print_active(const nlohmann::json& session) {
-  const std::string state = session.value("state", "");
-  const auto progress = session.value("progress", nlohmann::json());
-  fmt::print("{}  {}  {}\n",
-             session.value("id", ""),
-             state,
-             progress.is_object() ? progress_line(session.value("stage", ""), progress)
-                                  : session.value("message", ""));
+  const auto progress = session.find("progress");
+  const bool moves = progress != session.end() && progress->is_object();
+  fmt::print(
+      "{}  {}  {}\n",
+      text_of(session, "id"),
+      text_of(session, "state"),
+      moves ? progress_line(text_of(session, "stage"), *progress) : text_of(session, "message"));
+}
+
+nlohmann::json list_in(const nlohmann::json& json, const char* key) {
+  const auto it = json.find(key);
+  return it != json.end() && it->is_array() ? *it : nlohmann::json::array();
 }
 
 int status(const Arguments& arguments) {
@@ -119,13 +170,12 @@ int status(const Arguments& arguments) {
   const auto now = client.get("/v1/status");
   if (!now) return report(now.error());
   fmt::print("opalined {}, sessions in {}\n",
-             now->value("version", ""),
-             now->value("sessions_directory", ""));
-  for (const auto& session : now->value("active", nlohmann::json::array())) print_active(session);
-  for (const auto& session : all->value("sessions", nlohmann::json::array())) {
-    const std::string state = session.value("state", "");
-    if (state != "succeeded" && state != "failed" && state != "cancelled") continue;
-    fmt::print("{}  {}\n", session.value("id", ""), state);
+             text_of(*now, "version"),
+             text_of(*now, "sessions_directory"));
+  for (const auto& session : list_in(*now, "active")) print_active(session);
+  for (const auto& session : list_in(*all, "sessions")) {
+    const std::string state = text_of(session, "state");
+    if (is_over_named(state)) fmt::print("{}  {}\n", text_of(session, "id"), state);
   }
   return kDone;
 }
@@ -134,50 +184,85 @@ int post(const Arguments& arguments, const std::string& what) {
   const auto answer = DaemonClient(arguments.daemon)
                           .post(fmt::format("/v1/sessions/{}/{}", arguments.id, what), {});
   if (!answer) return report(answer.error());
-  fmt::print("{}  {}\n", arguments.id, answer->value("state", ""));
+  fmt::print("{}  {}\n", arguments.id, text_of(*answer, "state"));
   return kDone;
 }
 
-void declare_run(CLI::App& app, Arguments& arguments, int& status_code) {
-  CLI::App* command =
-      app.add_subcommand("run", "Make a session from a configuration and follow it to its report");
-  command->add_option("CONFIG", arguments.config, "session.toml")->required();
-  command->add_option(
-      "--name", arguments.name, "The session's name, in place of the configuration's");
-  command->add_flag("--local", arguments.local, "Without a daemon");
+// What a subcommand does, after what each of them needs first.
+std::function<void()> command(Arguments& arguments, int& status_code, std::function<int()> action) {
+  return [&arguments, &status_code, action = std::move(action)] {
+    if (!arguments.token_file.empty()) {
+      const Result<std::string> token = read_token(arguments.token_file);
+      if (!token) {
+        status_code = report(token.error());
+        return;
+      }
+      arguments.daemon.token = *token;
+    }
+    status_code = action();
+  };
+}
+
+void declare_local(CLI::App& command, Arguments& arguments, const char* help) {
+  command.add_flag("--local", arguments.local, help);
   command
+      .add_option("--programs",
+                  arguments.programs,
+                  "With --local: directory of opaline-capture and its siblings")
+      ->capture_default_str();
+}
+
+void declare_run(CLI::App& app, Arguments& arguments, int& status_code) {
+  CLI::App* run_command =
+      app.add_subcommand("run", "Make a session from a configuration and follow it to its report");
+  run_command->add_option("CONFIG", arguments.config, "session.toml")->required();
+  run_command->add_option(
+      "--name", arguments.name, "The session's name, in place of the configuration's");
+  declare_local(*run_command, arguments, "Without a daemon");
+  run_command
       ->add_option(
           "--sessions", arguments.sessions, "With --local: directory of the session directories")
       ->capture_default_str();
-  command
-      ->add_option("--programs",
-                   arguments.programs,
-                   "With --local: directory of opaline-capture and its siblings")
-      ->capture_default_str();
-  command->footer(
+  run_command->footer(
       "Ctrl-C cancels the session; a second one leaves it running.\nExit status: 0 done, 1 failed, "
-      "2 bad configuration, 3 cancelled, 4 busy");
-  command->callback([&] { status_code = run(arguments); });
+      "2 bad configuration, 3 cancelled, 4 busy, 5 left running\n\nExamples:\n  opaline run "
+      "config/sim.toml --name \"blue wax\"\n  opaline run --local --sessions ~/sessions "
+      "config/sim.toml");
+  run_command->callback(command(arguments, status_code, [&] { return run(arguments); }));
 }
 
-void declare_others(CLI::App& app, Arguments& arguments, int& status_code) {
-  CLI::App* command = app.add_subcommand("check", "Find every problem of session and rig files");
-  command->add_option("FILE", arguments.files, "session.toml or rig.toml")->required();
-  command->callback([&] { status_code = check(arguments); });
-  command = app.add_subcommand("status", "What the daemon has and does");
-  command->callback([&] { status_code = status(arguments); });
-  const auto with_id = [&](const char* name, const char* help, std::function<int()> action) {
+void declare_questions(CLI::App& app, Arguments& arguments, int& status_code) {
+  CLI::App* sub = app.add_subcommand("check", "Find every problem of session and rig files");
+  sub->add_option("FILE", arguments.files, "session.toml or rig.toml")->required();
+  sub->footer(
+      "Exit status: 0 no problems, 2 problems\n\nExample: opaline check session.toml rig.toml");
+  sub->callback(command(arguments, status_code, [&] { return check(arguments); }));
+  sub = app.add_subcommand("status", "What the daemon has and does");
+  sub->footer(
+      "Examples:\n  opaline status\n  opaline --url http://station:8787 --token-file "
+      "~/.opaline-token status");
+  sub->callback(command(arguments, status_code, [&] { return status(arguments); }));
+}
+
+void declare_deeds(CLI::App& app, Arguments& arguments, int& status_code) {
+  const auto add = [&](const char* name, const char* help, std::function<int()> action) {
     CLI::App* sub = app.add_subcommand(name, help);
     sub->add_option("ID", arguments.id, "The session, as \"opaline status\" lists it")->required();
-    sub->callback([&status_code, action = std::move(action)] { status_code = action(); });
+    sub->footer(fmt::format("Example: opaline {} 20260131-123456-ab12cd-marble", name));
+    sub->callback(command(arguments, status_code, std::move(action)));
+    return sub;
   };
-  with_id("watch", "Follow a session to its end", [&] {
-    return report(follow_session(arguments.daemon, arguments.id));
+  add("watch", "Follow a session to its end; Ctrl-C leaves it to the daemon", [&] {
+    return follow(arguments, arguments.id, OnInterrupt::kLeave);
   });
-  with_id("cancel", "Stop a session cleanly", [&] { return post(arguments, "cancel"); });
-  with_id("resume", "Try again what failed or was cancelled", [&] {
-    return post(arguments, "resume");
+  add("cancel", "Stop a session cleanly", [&] { return post(arguments, "cancel"); });
+  CLI::App* resume = add("resume", "Try again what failed or was cancelled", [&] {
+    return arguments.local ? resume_local(arguments) : post(arguments, "resume");
   });
+  declare_local(*resume, arguments, "Without a daemon: ID is the session's directory");
+  resume->footer(
+      "Examples:\n  opaline resume 20260131-123456-ab12cd-marble\n  opaline resume --local "
+      "~/sessions/20260131-123456-ab12cd-marble");
 }
 
 void declare(CLI::App& app, Arguments& arguments, int& status_code) {
@@ -188,7 +273,11 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
                  "The daemon's Unix socket; default $OPALINE_SOCKET or opaline/opalined.sock in "
                  "the runtime directory");
   app.add_option("--url", arguments.daemon.url, "A daemon on another machine: http://HOST:PORT");
-  app.add_option("--token", arguments.daemon.token, "Its token")->envname("OPALINE_TOKEN");
+  app.add_option("--token-file", arguments.token_file, "File with its token")
+      ->check(CLI::ExistingFile);
+  app.add_option(
+         "--token", arguments.daemon.token, "Its token, for every user of this machine to see")
+      ->envname("OPALINE_TOKEN");
   app.set_version_flag("--version", std::string("opaline ") + std::string(version()));
   app.require_subcommand(1);
   app.fallthrough();
@@ -200,7 +289,8 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
       "  opaline status                         what runs\n"
       "  opaline watch 20260131-123456-ab12cd-marble");
   declare_run(app, arguments, status_code);
-  declare_others(app, arguments, status_code);
+  declare_questions(app, arguments, status_code);
+  declare_deeds(app, arguments, status_code);
 }
 
 }  // namespace
@@ -216,6 +306,8 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
+  } catch (const std::exception& e) {
+    return report(internal_error(e.what()));
   }
   return status_code;
 }

@@ -21,6 +21,21 @@ void show_new(EventFollower& log, ProgressView& view) {
   for (const Event& event : *events) view.on_event(event.type, event.data);
 }
 
+/// Tells each new trouble once.
+class Troubles {
+ public:
+  explicit Troubles(ProgressView& view) : view_(view) {}
+  void tell(const Error& error) {
+    if (error.message != told_) view_.say(error.message + "; trying again");
+    told_ = error.message;
+  }
+  void over() { told_.clear(); }
+
+ private:
+  ProgressView& view_;
+  std::string told_;
+};
+
 }  // namespace
 
 Result<Ending> run_locally(const SessionDirectory& session,
@@ -29,7 +44,9 @@ Result<Ending> run_locally(const SessionDirectory& session,
   LocalExecutor executor(programs);
   const SystemClock clock;
   ProgressView view(terminal_options(), clock);
+  Troubles troubles(view);
   EventFollower log(session.events());
+  if (auto earlier = log.poll(); !earlier) return earlier.error();  // of runs before this one
   SessionSupervisor supervisor(session, station_lock, {executor, system_files(), clock});
   std::atomic<bool> cancel = false;
   std::stop_source leave;
@@ -47,7 +64,12 @@ Result<Ending> run_locally(const SessionDirectory& session,
     }
     BusyStations stations;
     const Result<SessionSnapshot> snapshot = supervisor.step(stations);
-    if (!snapshot) return snapshot.error();
+    if (!snapshot && leave.stop_requested()) return snapshot.error();
+    if (!snapshot) {
+      troubles.tell(snapshot.error());
+      continue;
+    }
+    troubles.over();
     show_new(log, view);
     if (snapshot->state != told) view.on_state(to_json(*snapshot));
     told = snapshot->state;
@@ -55,6 +77,17 @@ Result<Ending> run_locally(const SessionDirectory& session,
       return Ending{snapshot->id, session.path(), std::string(to_string(told)), snapshot->message};
     }
   }
+}
+
+Result<void> resume_locally(const SessionDirectory& session) {
+  const Result<SessionSnapshot> snapshot = read_snapshot(session);
+  if (!snapshot) return snapshot.error();
+  if (snapshot->state != SessionState::kFailed && snapshot->state != SessionState::kCancelled) {
+    return ok();
+  }
+  LocalExecutor nobody({});
+  const SystemClock clock;
+  return SessionSupervisor(session, {}, {nobody, system_files(), clock}).resume();
 }
 
 }  // namespace opaline::daemon

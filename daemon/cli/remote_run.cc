@@ -2,11 +2,13 @@
 
 #include <atomic>
 #include <csignal>
+#include <optional>
 #include <stop_token>
 
 #include "daemon/cli/run.h"
 #include "daemon/cli/terminal.h"
 #include "daemon/jobs/stop_signals.h"
+#include "daemon/json_text.h"
 #include "daemon/session_history.h"
 
 namespace opaline::daemon {
@@ -21,17 +23,20 @@ bool is_over_named(std::string_view state) {
 }
 
 Ending ending_of(const nlohmann::json& session) {
-  return {session.value("id", ""),
-          session.value("directory", ""),
-          session.value("state", ""),
-          session.value("message", "")};
+  return {text_of(session, "id"),
+          text_of(session, "directory"),
+          text_of(session, "state"),
+          text_of(session, "message")};
 }
 
 /// Follows one session over as many connections as it takes.
 class Follower {
  public:
-  Follower(const DaemonAddress& address, std::string id)
-      : address_(address), id_(std::move(id)), view_(terminal_options(), clock_) {}
+  Follower(const DaemonAddress& address, std::string id, OnInterrupt on_interrupt)
+      : address_(address),
+        id_(std::move(id)),
+        on_interrupt_(on_interrupt),
+        view_(terminal_options(), clock_) {}
 
   Result<Ending> run() {
     auto signals = StopSignals::watch([this](int signal) { on_signal(signal); });
@@ -43,6 +48,7 @@ class Follower {
           fmt::format("/v1/sessions/{}/events?since={}", id_, last_),
           [this](const ServerEvent& event) { on_event(event); },
           leave_.get_token());
+      if (problem_) return problem_->in("session " + id_);
       if (is_over_named(ending_.state) || leave_.stop_requested()) break;
       if (!followed && followed.error().code != ErrorCode::kUnavailable) return followed.error();
       failures = last_ > before ? 1 : failures + 1;
@@ -64,12 +70,14 @@ class Follower {
       view_.on_state(json);
     } else if (json.contains("data")) {
       view_.on_event(event.type, json["data"]);
+    } else if (event.type == "error") {
+      problem_ = unavailable(text_of(json, "message"));
     }
   }
 
   // On the signals' thread, with a connection of its own.
   void on_signal(int signal) {
-    if (signal == SIGTERM || cancel_sent_.exchange(true)) {
+    if (on_interrupt_ == OnInterrupt::kLeave || signal == SIGTERM || cancel_sent_.exchange(true)) {
       leave_.request_stop();
       return;
     }
@@ -86,18 +94,22 @@ class Follower {
 
   DaemonAddress address_;
   std::string id_;
+  OnInterrupt on_interrupt_;
   SystemClock clock_;
   ProgressView view_;
   std::stop_source leave_;
   std::atomic<bool> cancel_sent_ = false;
   std::uint64_t last_ = 0;
   Ending ending_;
+  std::optional<Error> problem_;  // that the daemon has with the session
 };
 
 }  // namespace
 
-Result<Ending> follow_session(const DaemonAddress& daemon, const std::string& id) {
-  return Follower(daemon, id).run();
+Result<Ending> follow_session(const DaemonAddress& daemon,
+                              const std::string& id,
+                              OnInterrupt on_interrupt) {
+  return Follower(daemon, id, on_interrupt).run();
 }
 
 }  // namespace opaline::daemon

@@ -1,6 +1,10 @@
 // The command line, against a real daemon and without one.
 
 #include <gmock/gmock.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <thread>
 
 #include "tests/api/opalined_fixture.h"
 
@@ -8,6 +12,7 @@ namespace opaline::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Opaline : public OpalinedTest {
  protected:
@@ -50,6 +55,35 @@ TEST_F(Opaline, CancelsTheSessionOnCtrlC) {
   EXPECT_EQ(run->wait(), 3) << run->output();
 }
 
+TEST_F(Opaline, LeavesTheSessionThatItWatchesOnCtrlC) {
+  start();
+  turn_on("capture.hold");
+  const std::string id = create();
+  const auto watch = spawn("opaline", {"watch", id}, "watch.out");
+  ASSERT_TRUE(eventually([&] { return watch->output().find("holding") != std::string::npos; }));
+
+  watch->kill(SIGINT);
+
+  EXPECT_EQ(watch->wait(), 5) << watch->output();
+  EXPECT_THAT(watch->output(), HasSubstr("opaline cancel " + id));
+  EXPECT_EQ(state_of(id), "running");
+}
+
+TEST_F(Opaline, TellsWhatTheDaemonCannotReadOfASession) {
+  start();
+  const std::string id = create();
+  ASSERT_TRUE(becomes(id, "succeeded"));
+  {
+    std::fstream log(sessions_ / id / "events.jsonl");
+    log.seekp(2);
+    log << "xxxx";
+  }
+  const auto watch = spawn("opaline", {"watch", id}, "watch.out");
+
+  EXPECT_EQ(watch->wait(), 1);
+  EXPECT_THAT(watch->output(), HasSubstr("events.jsonl"));
+}
+
 TEST_F(Opaline, FollowsASessionOverTheDeathOfItsDaemon) {
   start();
   turn_on("capture.hold");
@@ -78,6 +112,105 @@ TEST_F(Opaline, RunsWithoutADaemon) {
 
   EXPECT_EQ(run->wait(), 0) << run->output();
   EXPECT_THAT(run->output(), HasSubstr("preview: succeeded"));
+}
+
+TEST_F(Opaline, NamesTheDirectoryFirstAndResumesItWithoutADaemon) {
+  turn_on("reconstruct.fail", "no memory");
+  const auto run = run_local();
+  ASSERT_EQ(run->wait(), 1) << run->output();
+  const std::string output = run->output();
+  ASSERT_TRUE(output.starts_with("session  " + sessions_.string() + "/")) << output;
+  const std::string directory = output.substr(9, output.find('\n') - 9);
+  turn_off("reconstruct.fail");
+
+  const auto resumed =
+      spawn("opaline", {"resume", "--local", "--programs", fakes(), directory}, "resumed.out");
+
+  EXPECT_EQ(resumed->wait(), 0) << resumed->output();
+  EXPECT_THAT(resumed->output(), HasSubstr("preview: succeeded"));
+  EXPECT_THAT(resumed->output(), Not(HasSubstr("capture: started")));
+}
+
+TEST_F(Opaline, TriesAgainWhatFailsForAMomentWithoutADaemon) {
+  turn_on("capture.hold");
+  const auto run = run_local();
+  ASSERT_TRUE(eventually([&] { return run->output().find("holding") != std::string::npos; }));
+  const std::filesystem::path lock =
+      run->output().substr(9, run->output().find('\n') - 9) + "/lock";
+  std::filesystem::rename(lock, lock.string() + ".away");
+  std::filesystem::create_directory(lock);
+  EXPECT_TRUE(eventually([&] { return run->output().find("trying again") != std::string::npos; }))
+      << run->output();
+  std::filesystem::remove(lock);
+  std::filesystem::rename(lock.string() + ".away", lock);
+  turn_off("capture.hold");
+
+  EXPECT_EQ(run->wait(), 0) << run->output();
+}
+
+TEST_F(Opaline, AsksADaemonOverTcpWithItsToken) {
+  start({"--listen", "127.0.0.2", "--token-file", token_file()});
+  const std::string url = "http://127.0.0.2:" + std::to_string(port());
+  const auto status = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"--url", url, "status"};
+    arguments.insert(arguments.begin(), more.begin(), more.end());
+    const auto process = spawn("opaline", arguments, "status.out");
+    const int code = process->wait();
+    return std::pair(code, process->output());
+  };
+
+  EXPECT_EQ(status({"--token", "0123456789abcdef"}).first, 0);
+  EXPECT_EQ(status({"--token-file", token_file()}).first, 0);
+  const auto [code, output] = status({"--token", "wrong"});
+  EXPECT_EQ(code, 1);
+  EXPECT_THAT(output, HasSubstr("expected the daemon's token"));
+}
+
+/// Something at the daemon's socket that is no daemon: gives everybody the same answer.
+class Impostor {
+ public:
+  Impostor(const std::filesystem::path& socket, std::string body)
+      : listener_(*listen_unix(socket)),
+        reply_("HTTP/1.1 200 OK\r\nContent-Length: " + std::to_string(body.size()) +
+               "\r\nConnection: close\r\n\r\n" + body),
+        thread_([this](const std::stop_token& stop) {
+          while (!stop.stop_requested()) answer_one();
+        }) {}
+
+ private:
+  void answer_one() const {
+    pollfd ready{listener_.get(), POLLIN, 0};
+    if (::poll(&ready, 1, 10) <= 0) return;
+    const FileDescriptor peer(::accept(listener_.get(), nullptr, nullptr));
+    char request[65536];
+    if (::recv(peer.get(), request, sizeof request, 0) > 0) {
+      ::send(peer.get(), reply_.data(), reply_.size(), MSG_NOSIGNAL);
+    }
+    while (::recv(peer.get(), request, sizeof request, 0) > 0) {
+    }
+  }
+
+  FileDescriptor listener_;
+  std::string reply_;
+  std::jthread thread_;
+};
+
+TEST_F(Opaline, SaysClearlyThatAnAnswerIsNoDaemons) {
+  for (const char* body : {"7", "[]", "{}", R"({"id":7})", R"({"active":3,"sessions":"x"})"}) {
+    const Impostor impostor(socket_, body);
+    const auto run = spawn("opaline", {"run", demo().string()}, "run.out");
+    EXPECT_EQ(run->wait(), 1) << body;
+    EXPECT_THAT(run->output(), HasSubstr("the daemon's answer")) << body;
+    EXPECT_LE(spawn("opaline", {"status"}, "status.out")->wait(), 1) << body;
+  }
+}
+
+TEST_F(Opaline, GivesAnExampleForEverySubcommand) {
+  for (const char* command : {"run", "check", "status", "watch", "cancel", "resume"}) {
+    const auto help = spawn("opaline", {command, "--help"}, "help.out");
+    EXPECT_EQ(help->wait(), 0);
+    EXPECT_THAT(help->output(), HasSubstr("Example")) << command;
+  }
 }
 
 TEST_F(Opaline, CancelsWithoutADaemon) {
