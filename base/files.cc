@@ -108,6 +108,17 @@ class SystemFiles final : public FileOperations {
     return ok();
   }
 
+  Result<void> reserve(const fs::path& path, std::uint64_t bytes) override {
+    const Result<FileDescriptor> fd = open_file("append to", path, O_WRONLY | O_CREAT | O_APPEND);
+    if (!fd) return fd.error();
+    struct stat status {};
+    if (::fstat(fd->get(), &status) != 0) return system_error("append to", path, errno);
+    const int failed =
+        ::fallocate(fd->get(), FALLOC_FL_KEEP_SIZE, status.st_size, static_cast<off_t>(bytes));
+    if (failed == 0 || errno == EOPNOTSUPP || errno == ENOSYS) return ok();
+    return system_error(fmt::format("reserve {} bytes for", bytes), path, errno);
+  }
+
   Result<void> sync(const fs::path& path) override { return sync_path(path, O_RDONLY); }
 
   Result<void> sync_directory(const fs::path& directory) override {

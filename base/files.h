@@ -31,6 +31,11 @@ class FileOperations {
   virtual Result<void> append(const std::filesystem::path& path,
                               std::span<const std::byte> bytes) = 0;
   virtual Result<void> truncate(const std::filesystem::path& path, std::uint64_t size) = 0;
+  /// Makes sure that the next `bytes` appended find room, creating the file if needed; its size
+  /// stays. Where the file system cannot do that, nothing happens.
+  virtual Result<void> reserve(const std::filesystem::path& /*path*/, std::uint64_t /*bytes*/) {
+    return ok();
+  }
   virtual Result<void> sync(const std::filesystem::path& path) = 0;
   virtual Result<void> sync_directory(const std::filesystem::path& directory) = 0;
   virtual Result<void> rename(const std::filesystem::path& from,

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 
 #include <csignal>
@@ -48,6 +49,16 @@ TEST_F(FilesTest, LeavesTheOldFileAndNoPartialOneWhenAWriteFailsHalfWay) {
   EXPECT_FALSE(appended);
   EXPECT_EQ(read_text(path_).value(), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory_.path()), {}), 1);
+}
+
+TEST_F(FilesTest, KeepsRoomForAFileWithoutMakingItLonger) {
+  ASSERT_TRUE(write_whole(system_files(), path_, "begun"));
+  ASSERT_TRUE(system_files().reserve(path_, 1u << 20));
+  struct stat status {};
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_EQ(status.st_size, 5);
+  if (status.st_blocks * 512 < 1 << 20) GTEST_SKIP() << "the file system cannot";
+  EXPECT_EQ(read_text(path_).value(), "begun");
 }
 
 TEST_F(FilesTest, RefusesAFileLongerThanTheLimit) {
@@ -118,6 +129,21 @@ TEST_F(FilesTest, SessionDirectoryOfANewerVersionIsRefusedAndLeftAlone) {
   ASSERT_FALSE(session);
   EXPECT_THAT(session.error().message, HasSubstr("newer version (format 2"));
   EXPECT_EQ(read_text(path_ / "session.json").value(), newer);
+}
+
+TEST_F(FilesTest, SessionDirectoryTellsANewerFormatFromADamagedOneAtAnyNumber) {
+  ASSERT_TRUE(SessionDirectory::create(system_files(), path_, {"wax", "", "", ""}));
+  for (const auto& [format, message] : {std::pair{"4294967297", "newer version (format 4294967297"},
+                                        {"18446744073709551615", "newer version"},
+                                        {"0", "damaged"},
+                                        {"-1", "damaged"},
+                                        {"1.5", "damaged"}}) {
+    const std::string text = std::string(R"({"name": "wax", "format": )") + format + "}";
+    ASSERT_TRUE(write_whole(system_files(), path_ / "session.json", text));
+    const auto session = SessionDirectory::open(path_);
+    ASSERT_FALSE(session) << format;
+    EXPECT_THAT(session.error().message, HasSubstr(message));
+  }
 }
 
 }  // namespace

@@ -236,8 +236,18 @@ Result<void> FullDisk::write(const fs::path& path, std::span<const std::byte> by
   return unsynced_files().write(path, bytes);
 }
 Result<void> FullDisk::append(const fs::path& path, std::span<const std::byte> bytes) {
-  if (auto room = take(path, bytes.size()); !room) return room;
+  std::size_t& reserved = reserved_[path];
+  const std::size_t from_reserve = std::min(reserved, bytes.size());
+  if (auto room = take(path, bytes.size() - from_reserve); !room) return room;
+  reserved -= from_reserve;
   return unsynced_files().append(path, bytes);
+}
+Result<void> FullDisk::reserve(const fs::path& path, std::uint64_t bytes) {
+  std::size_t& reserved = reserved_[path];
+  if (reserved >= bytes) return ok();
+  if (auto room = take(path, bytes - reserved); !room) return room;
+  reserved = bytes;
+  return ok();
 }
 Result<void> FullDisk::truncate(const fs::path& path, std::uint64_t size) {
   return unsynced_files().truncate(path, size);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <span>
 #include <string>
@@ -57,10 +58,11 @@ class RecordingFiles : public FileOperations {
 FileOperations& unsynced_files();
 
 /// A disk with room for so many bytes more: a write or append past it fails as the system's does, and
-/// leaves nothing behind.
+/// leaves nothing behind. What was reserved for a file is taken from the room then, and not again.
 class FullDisk : public FileOperations {
  public:
   explicit FullDisk(std::size_t room) : room_(room) {}
+  Result<void> reserve(const std::filesystem::path& path, std::uint64_t bytes) override;
   Result<void> make_directories(const std::filesystem::path& directory) override;
   Result<void> write(const std::filesystem::path& path, std::span<const std::byte> bytes) override;
   Result<void> append(const std::filesystem::path& path, std::span<const std::byte> bytes) override;
@@ -73,6 +75,7 @@ class FullDisk : public FileOperations {
  private:
   Result<void> take(const std::filesystem::path& path, std::size_t bytes);
   std::size_t room_;
+  std::map<std::filesystem::path, std::size_t> reserved_;
 };
 
 /// Lays out in `directory` what a disk may hold after the power failed behind the last of
