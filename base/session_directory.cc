@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/clock.h"
+#include "base/format_version.h"
 
 namespace opaline {
 namespace {
@@ -48,18 +49,12 @@ Result<SessionDirectory> SessionDirectory::open(const std::filesystem::path& pat
   }
   if (!text) return text.error();
   const auto json = nlohmann::json::parse(*text, nullptr, false);
-  if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
+  const auto format = format_of(json);
+  if (!format) {
     return invalid_argument(
         fmt::format("{} is damaged: restore it from a copy", marker(directory).string()));
   }
-  const int format = json["format"].get<int>();
-  if (format > kFormat || format < 1) {
-    return invalid_argument(fmt::format(
-        "{} was written by a newer version (format {}, this one reads up to {}): use that version",
-        directory.string(),
-        format,
-        kFormat));
-  }
+  if (*format > kFormat) return newer_format(directory, *format, kFormat);
   const auto name = json.find("name");
   return SessionDirectory(
       directory,

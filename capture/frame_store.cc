@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "base/format_version.h"
 #include "base/io/image_io.h"
 #include "base/sha256.h"
 #include "capture/exposure_plan.h"
@@ -134,22 +135,21 @@ Result<void> FrameStore::save(const std::string& light,
   return write_whole(files_, directory / "index.json", index.dump(2) + "\n");
 }
 
-Result<std::optional<std::vector<CapturedFrame>>> FrameStore::load(
-    const std::string& light, const drivers::Pattern& pattern) const {
-  using Loaded = std::optional<std::vector<CapturedFrame>>;
+Result<StoredLight> FrameStore::load(const std::string& light,
+                                     const drivers::Pattern& pattern) const {
   const fs::path path = directory_ / light / "index.json";
   const auto text = read_text(path);
-  if (!text && text.error().code == ErrorCode::kNotFound) return Loaded();
-  if (!text) return text.error();
+  if (!text && text.error().code == ErrorCode::kNotFound) return StoredLight{};
+  if (!text) return StoredLight{{}, text.error().message};
   const json index = json::parse(*text, nullptr, false);
-  if (!index.is_object()) return damaged(path, "it is not JSON");
-  if (index.value("pattern", json()) != identity_of(pattern)) return Loaded();
+  if (!index.is_object()) return StoredLight{{}, damaged(path, "it is not JSON").message};
+  const auto format = format_of(index);
+  if (!format) return StoredLight{{}, damaged(path, "no format").message};
+  if (*format > kFormat) return newer_format(path, *format, kFormat);
+  if (index.value("pattern", json()) != identity_of(pattern)) return StoredLight{};
   auto frames = read_frames(directory_ / light, index);
-  if (!frames) {
-    // A frame that is gone is as bad as one that is torn.
-    return Error{ErrorCode::kInvalidArgument, frames.error().message};
-  }
-  return Loaded(*std::move(frames));
+  if (!frames) return StoredLight{{}, frames.error().message};
+  return StoredLight{*std::move(frames), {}};
 }
 
 bool FrameStore::has(const std::string& light) const {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,12 +22,18 @@ struct CapturedFrame {
   Frame frame;
 };
 
+/// What lies on disk of one light.
+struct StoredLight {
+  std::vector<CapturedFrame> frames;  ///< none: never captured wholly, of another pattern, damaged
+  std::string damage;                 ///< what is wrong with which file; empty: nothing
+};
+
 /// The raw frames of a session on disk:
 ///
 ///   LIGHT/INDEX-MILLISECONDSms.png   16-bit, the camera's codes
-///   LIGHT/index.json                 written last: per frame pattern, trigger count, times,
-///   exposure
-///                                    and the SHA-256 of pixels and file; identity of the pattern
+///   LIGHT/index.json                 written last: format version, identity of the pattern; per
+///                                    frame pattern, trigger count, times, exposure, and the
+///                                    SHA-256 of pixels and file
 ///
 /// So a light is there wholly, or is taken again.
 class FrameStore {
@@ -40,10 +45,9 @@ class FrameStore {
   Result<void> save(const std::string& light,
                     const drivers::Pattern& pattern,
                     std::span<const CapturedFrame> frames);
-  /// Every frame, each checked against its SHA-256. None when the light was never captured wholly,
-  /// or with another pattern than this. Errors: kInvalidArgument for a damaged file, naming it.
-  Result<std::optional<std::vector<CapturedFrame>>> load(const std::string& light,
-                                                         const drivers::Pattern& pattern) const;
+  /// Every frame of this pattern, each checked against its SHA-256.
+  /// Errors: kInvalidArgument when a newer version wrote them: not to be taken again.
+  Result<StoredLight> load(const std::string& light, const drivers::Pattern& pattern) const;
   /// Whether the light was captured wholly, as far as names tell.
   bool has(const std::string& light) const;
   const std::filesystem::path& directory() const { return directory_; }

@@ -177,8 +177,11 @@ drivers::Pattern pattern_of(const PixelRectangle& box,
   return pattern;
 }
 
-drivers::Pattern uniform(std::uint64_t id, const ProjectorCalibration& p, std::uint8_t code) {
-  return {id, Image<std::uint8_t>(p.width, p.height, 3, code)};
+drivers::Pattern uniform(std::uint64_t id,
+                         const ProjectorCalibration& p,
+                         std::uint8_t code,
+                         const char* name) {
+  return {id, Image<std::uint8_t>(p.width, p.height, 3, code), name};
 }
 
 }  // namespace
@@ -222,12 +225,15 @@ Result<PatternSet> make_patterns(const PatternOptions& options,
                                  const Block& block,
                                  Face lit_face,
                                  const ProjectorCalibration& projector) {
-  PatternSet set{uniform(kBlackPattern, projector, 0), uniform(kWhitePattern, projector, 255), {}};
+  PatternSet set{uniform(kBlackPattern, projector, 0, "black"),
+                 uniform(kWhitePattern, projector, 255, "white"),
+                 {}};
   std::uint64_t id = kFirstLight;
   for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
     const auto box = pixels_within(light, projector);
     if (!box) return box.error();
     drivers::Pattern pattern = pattern_of(*box, id++, projector);
+    pattern.name = light.name;
     Image<float> irradiance = irradiance_of(pattern.codes, block, lit_face, projector);
     set.lights.push_back({light.name, light.held_out, std::move(pattern), std::move(irradiance)});
   }

@@ -184,19 +184,19 @@ std::optional<RegionTaker::Failure> RegionTaker::show(const drivers::Pattern& pa
   return std::nullopt;
 }
 
-RegionTaker::CaptureResult RegionTaker::capture(std::uint64_t pattern_id,
+RegionTaker::CaptureResult RegionTaker::capture(const drivers::Pattern& pattern,
                                                 std::size_t index,
                                                 const Watcher& watcher,
                                                 std::stop_token stop) {
   const nanoseconds exposure = ladder_[index];
   if (watcher) watcher(exposure);
   const std::string where = fmt::format("exposure of {:.4g} s", seconds(exposure));
-  auto frame = station_.camera.capture({exposure, pattern_id}, stop);
+  auto frame = station_.camera.capture({exposure, pattern.id, pattern.name}, stop);
   if (!frame) {
     check_->forget();
     return tl::unexpected(Failure{frame.error().in(where), "device"});
   }
-  if (const auto problem = check_->check(*frame, pattern_id, exposure)) {
+  if (const auto problem = check_->check(*frame, pattern.id, exposure)) {
     return tl::unexpected(
         Failure{unavailable(fmt::format(
                     "{}: {} frame: {}", where, to_string(problem->fault), problem->message)),
@@ -211,7 +211,7 @@ RegionTaker::Attempt RegionTaker::attempt_black(const drivers::Pattern& black,
   if (auto failure = show(black, stop)) return tl::unexpected(*std::move(failure));
   TakenLight taken{{}, true, 0};
   for (std::size_t i = 0; i < ladder_.size(); ++i) {
-    auto frame = capture(black.id, i, watcher, stop);
+    auto frame = capture(black, i, watcher, stop);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     taken.frames.push_back(*std::move(frame));
   }
@@ -228,7 +228,7 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
   std::vector<double> times;
   Bracket bracket(settings_.options.exposures, ladder_.size());
   while (const auto index = bracket.next()) {
-    auto frame = capture(pattern.id, *index, watcher, stop);
+    auto frame = capture(pattern, *index, watcher, stop);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     const auto pair = black.pair(*frame);
     if (!pair) {

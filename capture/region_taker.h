@@ -109,7 +109,7 @@ class RegionTaker {
                                   const AttemptFunction& attempt,
                                   std::stop_token stop);
   std::optional<Failure> show(const drivers::Pattern& pattern, std::stop_token stop);
-  CaptureResult capture(std::uint64_t pattern_id,
+  CaptureResult capture(const drivers::Pattern& pattern,
                         std::size_t index,
                         const Watcher& watcher,
                         std::stop_token stop);

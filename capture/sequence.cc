@@ -72,8 +72,8 @@ class Sequence {
   Result<RegionTaker*> taker();
   Result<void> take_black(std::stop_token stop);
   Result<void> do_light(const Light& light, std::stop_token stop);
-  Result<std::optional<std::vector<CapturedFrame>>> load(const std::string& name,
-                                                         const drivers::Pattern& pattern);
+  /// None when the light is to be taken.
+  Result<std::vector<CapturedFrame>> load(const std::string& name, const drivers::Pattern& pattern);
   Result<Frames> frames_of(const Light& light, std::stop_token stop);
   Result<Frames> take(const Light& light, std::stop_token stop);
   Result<void> confirm_lamp(const std::string& region, std::stop_token stop);
@@ -160,30 +160,30 @@ Result<void> Sequence::check_space() const {
                   *free));
 }
 
-Result<std::optional<std::vector<CapturedFrame>>> Sequence::load(const std::string& name,
-                                                                 const drivers::Pattern& pattern) {
-  using Loaded = std::optional<std::vector<CapturedFrame>>;
-  auto loaded = store_.load(name, pattern);
-  if (loaded) {
-    const CameraModel& model = task_.calibration.camera.model;
-    const bool fits = !*loaded || std::ranges::all_of(**loaded, [&](const CapturedFrame& c) {
-      return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height &&
-             c.frame.pixels.channels() == 3;
-    });
-    return fits ? *std::move(loaded) : Loaded();
+Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,
+                                                  const drivers::Pattern& pattern) {
+  auto stored = store_.load(name, pattern);
+  if (!stored) return stored.error();
+  if (!stored->damage.empty()) {
+    log::warning("{}; {} is taken again", stored->damage, name);
+    auto noted =
+        work_.events.fact("region.damaged", {{"region", name}, {"message", stored->damage}});
+    if (!noted) return noted.error();
   }
-  log::warning("{}; {} is taken again", loaded.error().message, name);
-  auto noted =
-      work_.events.fact("region.damaged", {{"region", name}, {"message", loaded.error().message}});
-  if (!noted) return noted.error();
-  return Loaded();
+  const CameraModel& model = task_.calibration.camera.model;
+  const bool fits = std::ranges::all_of(stored->frames, [&](const CapturedFrame& c) {
+    return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height &&
+           c.frame.pixels.channels() == 3;
+  });
+  if (!fits) stored->frames.clear();
+  return std::move(stored->frames);
 }
 
 Result<void> Sequence::take_black(std::stop_token stop) {
   auto stored = load(kBlackName, patterns_.black);
   if (!stored) return stored.error();
-  if (*stored) {
-    black_ = BlackFrames(**std::move(stored), task_.calibration.camera, map_.footprint());
+  if (!stored->empty()) {
+    black_ = BlackFrames(*std::move(stored), task_.calibration.camera, map_.footprint());
     return ok();
   }
   auto devices = taker();
@@ -222,8 +222,8 @@ bool Sequence::shows_light(std::span<const ExposurePair> pairs) const {
 Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token stop) {
   auto stored = load(light.name, light.pattern);
   if (!stored) return stored.error();
-  if (!*stored) return take(light, stop);
-  Frames found{**std::move(stored)};
+  if (stored->empty()) return take(light, stop);
+  Frames found{*std::move(stored)};
   const auto pairs = pairs_of(light.name, found.frames);
   if (!pairs) return pairs.error();
   found.lit = shows_light(*pairs);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/format_version.h"
 #include "base/io/image_io.h"
 #include "base/sha256.h"
 
@@ -163,15 +164,9 @@ Result<json> read_sidecar(const fs::path& path) {
   if (!text) return text.error();
   json sidecar = json::parse(*text, nullptr, false);
   if (!sidecar.is_object()) return damaged(path, "it is not JSON");
-  const auto format = sidecar.find("format");
-  if (format == sidecar.end() || !format->is_number_integer()) return damaged(path, "no format");
-  if (format->get<int>() > kDatasetFormat) {
-    return invalid_argument(fmt::format(
-        "{} was written by a newer version (format {}, this one reads up to {}): use that version",
-        path.string(),
-        format->get<int>(),
-        kDatasetFormat));
-  }
+  const auto format = format_of(sidecar);
+  if (!format) return damaged(path, "no format");
+  if (*format > kDatasetFormat) return newer_format(path, *format, kDatasetFormat);
   return sidecar;
 }
 

@@ -16,7 +16,7 @@ inline constexpr int kDatasetFormat = 1;
 ///                      NAME.variance.R G B and NAME.mask (0 or 1)
 ///   dataset_light.exr  the lit face: per illumination NAME.irradiance.R G B
 ///   dataset.json       format version, block, ior, faces, the illuminations in order, SHA-256 of
-///   both
+///                      both
 ///
 /// dataset.json is written last and each file whole, so what can be read is complete. The same
 /// dataset gives the same bytes.

@@ -268,6 +268,19 @@ TEST_F(SequenceTest, RetakesARegionWhoseIndexListsMoreFramesThanThereCanBe) {
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
 }
 
+TEST_F(SequenceTest, LeavesFramesOfANewerVersionAlone) {
+  ASSERT_TRUE(run(dir_.path()));
+  const fs::path path = dir_.path() / "frames" / "region_0_1" / "index.json";
+  const std::string newer = R"({"format": 2, "frames": "otherwise"})";
+  ASSERT_TRUE(write_whole(system_files(), path, newer));
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_EQ(summary.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(summary.error().message,
+              AllOf(HasSubstr(path.string()), HasSubstr("newer version (format 2")));
+  EXPECT_EQ(read_text(path).value(), newer);
+}
+
 TEST_F(SequenceTest, RetakesBlackFramesThatWereDamaged) {
   ASSERT_TRUE(run(dir_.path()));
   for (const auto& entry : fs::directory_iterator(dir_.path() / "frames" / "black")) {
