@@ -18,8 +18,8 @@ header p { color: var(--soft); margin: .2rem 0 0; }
 h1 { font-size: 2rem; line-height: 1.2; margin: 0; letter-spacing: -.01em; }
 h2 { font-size: 1.35rem; margin: 0 0 .6rem; padding-top: 2.4rem; }
 h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; }
-nav { margin: 1.2rem 0 0; font-size: .92rem; }
-nav a { color: var(--accent); text-decoration: none; margin-right: 1.1rem; white-space: nowrap; }
+nav { display: flex; flex-wrap: wrap; gap: 0 1.1rem; margin: 1.2rem 0 0; font-size: .92rem; }
+nav a { color: var(--accent); text-decoration: none; }
 nav a:hover { text-decoration: underline; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: .8rem; margin: 1.4rem 0; }
 .figure { background: var(--card); border-radius: 10px; padding: .9rem 1rem; }
