@@ -39,6 +39,12 @@ BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
                          });
 }
 
+bool BlackFrames::cover(std::span<const nanoseconds> exposures) const {
+  return std::ranges::all_of(exposures, [this](nanoseconds exposure) {
+    return std::ranges::find(frames_, exposure, &CapturedFrame::exposure_asked) != frames_.end();
+  });
+}
+
 std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const {
   const auto black =
       std::ranges::find(frames_, light.exposure_asked, &CapturedFrame::exposure_asked);

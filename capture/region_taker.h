@@ -31,6 +31,9 @@ class BlackFrames {
   BlackFrames(std::vector<CapturedFrame> frames,
               const CameraCalibration& camera,
               const Image<std::uint8_t>& seen);
+  bool empty() const { return frames_.empty(); }
+  /// Whether there is a black of each of these exposures.
+  bool cover(std::span<const std::chrono::nanoseconds> exposures) const;
   /// Hot pixels: 1.
   const Image<std::uint8_t>& hot() const { return hot_; }
   /// Pixels that see the sample and are not hot: 1. Only these tell light from dark, since a hot

@@ -22,8 +22,9 @@ struct CameraInfo {
 
 struct ExposureRequest {
   std::chrono::nanoseconds exposure{};
-  std::uint64_t expected_pattern =
-      0;  ///< what the projector was told; only replay needs it, to pick the photograph
+  /// What the projector was told; only replay needs it, to pick the photograph.
+  std::uint64_t expected_pattern = 0;
+  std::string expected_name = {};
 };
 
 /// A camera that takes one exposure when asked.

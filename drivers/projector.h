@@ -25,6 +25,7 @@ struct ProjectorInfo {
 struct Pattern {
   std::uint64_t id = 0;  ///< > 0, unique within a session
   Image<std::uint8_t> codes;
+  std::string name = {};  ///< "region_0_1"; for people and for replay
 };
 
 /// A projector that shows one pattern until told otherwise.

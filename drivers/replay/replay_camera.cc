@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <functional>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <variant>
@@ -36,12 +38,18 @@ CameraInfo describe(const ReplayIndex& index, const std::filesystem::path& folde
           longest->exposure * 11 / 10};
 }
 
+/// A photograph without an id is of whichever pattern has its name.
+bool shows(const Photograph& photograph, const ExposureRequest& request) {
+  if (photograph.pattern_id) return *photograph.pattern_id == request.expected_pattern;
+  return photograph.pattern == request.expected_name;
+}
+
 /// The best photograph, or none of that pattern.
 const Photograph* find(const ReplayIndex& index, const ExposureRequest& request) {
   const Photograph* best = nullptr;
   double best_ratio = 0.0;
   for (const Photograph& photograph : index.photographs) {
-    if (photograph.pattern_id != request.expected_pattern) continue;
+    if (!shows(photograph, request)) continue;
     const double ratio =
         std::abs(std::log(seconds(photograph.exposure) / seconds(request.exposure)));
     if (best == nullptr || ratio < best_ratio) {
@@ -52,18 +60,23 @@ const Photograph* find(const ReplayIndex& index, const ExposureRequest& request)
   return best;
 }
 
-/// "1 (region_0_0), 2, ...": the patterns there are photographs of, the first few.
+/// "1 (region_0_0)", "1", or "region_0_0".
+std::string label(std::optional<std::uint64_t> id, const std::string& name) {
+  if (!id) return name;
+  return name.empty() ? fmt::format("{}", *id) : fmt::format("{} ({})", *id, name);
+}
+
+/// The patterns there are photographs of, the first few.
 std::string patterns_of(const ReplayIndex& index) {
-  std::map<std::uint64_t, std::string> names;
+  std::set<std::pair<std::optional<std::uint64_t>, std::string>> patterns;
   for (const Photograph& photograph : index.photographs) {
-    names.emplace(photograph.pattern_id, photograph.pattern);
+    patterns.emplace(photograph.pattern_id, photograph.pattern);
   }
   std::string text;
   int listed = 0;
-  for (const auto& [id, name] : names) {
+  for (const auto& [id, name] : patterns) {
     if (++listed > 8) return text + ", ...";
-    text += fmt::format(
-        "{}{}{}", listed > 1 ? ", " : "", id, name.empty() ? "" : fmt::format(" ({})", name));
+    text += (listed > 1 ? ", " : "") + label(id, name);
   }
   return text;
 }
@@ -102,23 +115,33 @@ Result<Image<std::uint16_t>> codes_of(const ImageFile& file, const ReplayIndex& 
     });
   }
   const auto same = [](double value) { return value; };
-  if (const auto* bytes = std::get_if<Image<std::uint8_t>>(&file.pixels))
-    return codes_of(*bytes, index, same);
+  if (const auto* bytes = std::get_if<Image<std::uint8_t>>(&file.pixels)) {
+    if (index.bit_depth == 8) return codes_of(*bytes, index, same);
+    return unavailable(
+        fmt::format("has 8 bits, and the index says bit_depth = {}; expected 8", index.bit_depth));
+  }
   return codes_of(std::get<Image<std::uint16_t>>(file.pixels), index, same);
 }
 
+/// Asks before each step, any of which may take a while, whether it is still wanted.
 Result<Image<std::uint16_t>> read_photograph(const std::filesystem::path& path,
                                              const Photograph& photograph,
-                                             const ReplayIndex& index) {
+                                             const ReplayIndex& index,
+                                             const std::function<bool()>& unwanted) {
+  const Error stopped = cancelled("stopped");
   const auto bytes = read_bytes(path, kFileLimit);
   if (!bytes) return unavailable(bytes.error().message);
+  if (unwanted()) return stopped;
   if (!photograph.sha256.empty() && sha256_hex(*bytes) != photograph.sha256) {
     return unavailable(fmt::format("{}: SHA-256 differs from the index", path.string()));
   }
+  if (unwanted()) return stopped;
   const auto file = decode_image(*bytes);
   if (!file) return unavailable(fmt::format("{}: {}", path.string(), file.error().message));
+  if (unwanted()) return stopped;
   auto codes = codes_of(*file, index);
   if (!codes) return codes.error().in(path.string());
+  if (unwanted()) return stopped;
   return codes;
 }
 
@@ -136,7 +159,7 @@ Result<void> ReplayCamera::open() {
   auto index = read_replay_index(folder_);
   if (!index) return index.error();
   const std::lock_guard lock(mutex_);
-  index_ = *std::move(index);
+  index_ = std::make_shared<const ReplayIndex>(*std::move(index));
   trigger_count_ = 0;
   return ok();
 }
@@ -147,33 +170,49 @@ Result<CameraInfo> ReplayCamera::info() const {
   return describe(*index_, folder_);
 }
 
-Result<Frame> ReplayCamera::capture(const ExposureRequest& request, std::stop_token stop) {
+bool ReplayCamera::is_open_with(const Index& index) const {
   const std::lock_guard lock(mutex_);
-  if (!index_) return unavailable("replay camera: not open");
-  if (stop.stop_requested()) return cancelled("replay camera: stopped");
-  if (auto good = check_range(describe(*index_, folder_), request.exposure); !good)
-    return good.error();
-  const Photograph* photograph = find(*index_, request);
+  return index_ == index;
+}
+
+Result<Frame> ReplayCamera::read_frame(const Index& index,
+                                       const ExposureRequest& request,
+                                       const std::stop_token& stop) const {
+  const Photograph* photograph = find(*index, request);
   if (photograph == nullptr) {
     return not_found(fmt::format("{}: no photograph of pattern {}; there are {}",
                                  folder_.string(),
-                                 request.expected_pattern,
-                                 patterns_of(*index_)));
-  }
-  const nanoseconds start = clock_.now();
-  auto pixels = read_photograph(folder_ / photograph->file, *photograph, *index_);
-  if (!pixels) {
-    index_.reset();
-    return pixels.error().in("replay camera");
+                                 label(request.expected_pattern, request.expected_name),
+                                 patterns_of(*index)));
   }
   Frame frame;
+  frame.start = clock_.now();
+  auto pixels = read_photograph(folder_ / photograph->file, *photograph, *index, [&] {
+    return stop.stop_requested() || !is_open_with(index);
+  });
+  if (!pixels) return pixels.error().in("replay camera");
   frame.pixels = *std::move(pixels);
-  frame.bit_depth = index_->bit_depth;
-  frame.pattern_id = photograph->pattern_id;
-  frame.trigger_count = ++trigger_count_;
-  frame.start = start;
+  frame.bit_depth = index->bit_depth;
+  frame.pattern_id = photograph->pattern_id.value_or(request.expected_pattern);
   frame.exposure = photograph->exposure;
   frame.sha256 = frame_hash(frame.pixels);
+  return frame;
+}
+
+Result<Frame> ReplayCamera::capture(const ExposureRequest& request, std::stop_token stop) {
+  const Index index = [&] {
+    const std::lock_guard lock(mutex_);
+    return index_;
+  }();
+  if (!index) return unavailable("replay camera: not open");
+  if (stop.stop_requested()) return cancelled("replay camera: stopped");
+  if (auto good = check_range(describe(*index, folder_), request.exposure); !good)
+    return good.error();
+  Result<Frame> frame = read_frame(index, request, stop);
+  const std::lock_guard lock(mutex_);
+  if (index_ != index) return cancelled("replay camera: closed");
+  if (frame) frame->trigger_count = ++trigger_count_;
+  if (!frame && frame.error().code == ErrorCode::kUnavailable) index_.reset();
   return frame;
 }
 

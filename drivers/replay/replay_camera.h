@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <mutex>
-#include <optional>
 
 #include "base/clock.h"
 #include "drivers/camera.h"
@@ -13,7 +13,8 @@ namespace opaline::drivers {
 
 /// A folder of photographs as a camera: an exposure is the photograph of the expected pattern whose exposure is
 /// nearest (in ratio) to the one asked for; the frame says what the photograph's was. Exposures range from 0.9 times
-/// the shortest to 1.1 times the longest photograph's. It waits for nothing.
+/// the shortest to 1.1 times the longest photograph's. A capture takes as long as reading the file does; it looks at
+/// the stop token, and whether it was closed, before each step of that.
 ///
 /// Errors, besides Camera's: kNotFound without a photograph of the pattern; kUnavailable, naming the file, for one that
 /// is gone, damaged, or not as the index says.
@@ -29,11 +30,17 @@ class ReplayCamera : public Camera {
   void close() noexcept override;
 
  private:
+  using Index = std::shared_ptr<const ReplayIndex>;
+  bool is_open_with(const Index& index) const;
+  Result<Frame> read_frame(const Index& index,
+                           const ExposureRequest& request,
+                           const std::stop_token& stop) const;
+
   std::filesystem::path folder_;
   const Clock& clock_;
   mutable std::mutex mutex_;
-  std::optional<ReplayIndex> index_;  // guarded by mutex_; none: closed
-  std::uint64_t trigger_count_ = 0;   // guarded by mutex_
+  Index index_;                      // guarded by mutex_; of this opening; null: closed
+  std::uint64_t trigger_count_ = 0;  // guarded by mutex_
 };
 
 }  // namespace opaline::drivers

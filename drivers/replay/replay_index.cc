@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <toml++/toml.h>
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -105,8 +106,12 @@ Result<Photograph> read_photograph(const std::string& file, const toml::table& t
   reader.known({"file", "pattern_id", "pattern", "exposure_s", "sha256"});
   Photograph photograph;
   reader.text("file", photograph.file);
-  reader.whole("pattern_id", photograph.pattern_id, 0, 0x1p53, true);
   reader.text("pattern", photograph.pattern);
+  if (table.contains("pattern_id"))
+    reader.whole("pattern_id", photograph.pattern_id.emplace(), 0, 0x1p53);
+  if (!photograph.pattern_id && photograph.pattern.empty()) {
+    reader.fail(table, "[[photograph]] without pattern or pattern_id");
+  }
   reader.time("exposure_s", photograph.exposure, 1.0, true);
   reader.text("sha256", photograph.sha256);
   const std::filesystem::path name(photograph.file);

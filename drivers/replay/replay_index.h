@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,9 +13,10 @@ namespace opaline::drivers {
 
 /// One photograph of a replayed session.
 struct Photograph {
-  std::string file;                     ///< name in the folder
-  std::uint64_t pattern_id = 0;         ///< shown during the exposure; 0 = lamp dark
-  std::string pattern;                  ///< its name, for people; may be empty
+  std::string file;  ///< name in the folder
+  std::optional<std::uint64_t>
+      pattern_id;       ///< shown during the exposure; 0 = lamp dark; none: known by its name
+  std::string pattern;  ///< its name; may be empty where there is an id
   std::chrono::nanoseconds exposure{};  ///< as measured
   std::string sha256;                   ///< of the file, lower-case hex; empty: not checked
 };
@@ -25,7 +27,7 @@ struct Photograph {
 ///     model = "Canon 5D"        # for people
 ///     width = 256
 ///     height = 256
-///     bit_depth = 12            # codes of the photographs run from 0 to 2^bit_depth - 1
+///     bit_depth = 12            # codes of the photographs run from 0 to 2^bit_depth - 1; 8-bit photographs need 8
 ///     codes_per_unit = 4095.0   # code = codes_per_unit x value, for EXR only
 ///
 ///     [projector]               # what patterns were made for; may be left out: 640 x 480, 33.333333 ms, 50 ms
@@ -36,8 +38,8 @@ struct Photograph {
 ///
 ///     [[photograph]]            # once for each; 8- and 16-bit PNG and TIFF, EXR; grey ones count for three channels
 ///     file = "region_0_0-1.png"
-///     pattern_id = 12           # as the capture numbers its patterns; 0 = lamp dark
-///     pattern = "region_0_0"    # may be left out
+///     pattern = "region_0_0"    # what was shown, as the capture names it: "black", "region_ROW_COLUMN", "held_out_..."
+///     pattern_id = 16           # or its number, which counts where both are given; 0 = lamp dark
 ///     exposure_s = 0.0333
 ///     sha256 = "..."            # may be left out
 struct ReplayIndex {
