@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -115,6 +116,7 @@ Result<void> print_truth(const Arguments& arguments) {
   const auto truth = sim::RigClient(arguments.socket).truth();
   if (!truth) return truth.error();
   nlohmann::json json = sim::encode(*truth).header;
+  json["patch_irradiance"] = truth->patch_irradiance;
   json["surface_radiance"] = truth->surface_radiance.samples();
   fmt::print("{}\n", json.dump());
   return opaline::ok();
@@ -196,9 +198,7 @@ int exit_code(opaline::ErrorCode code) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app("The simulated station as a process of its own.");
   Arguments arguments;
   add_serve(app, arguments);
@@ -220,4 +220,15 @@ int main(int argc, char** argv) {
   if (done) return 0;
   opaline::log::error("{}", done.error().message);
   return exit_code(done.error().code);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+    return 1;
+  }
 }

@@ -55,9 +55,8 @@ class CameraConnection {
 
  private:
   struct Image {
-    std::array<double, 3> point{};        // where the event seems to be, unfolded
-    std::array<double, 3> sign{1, 1, 1};  // of the true direction against the unfolded one
-    int mirrors = 0;                      // bit a: mirrored along axis a
+    std::array<double, 3> point{};  // where the event seems to be, unfolded
+    int mirrors = 0;                // bit a: mirrored along axis a
   };
   void add_image(const Image& image,
                  const std::array<double, 3>& direction,

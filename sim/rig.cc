@@ -68,6 +68,7 @@ struct Rig::Exposure {
   std::uint64_t key = 0;  ///< of all its randomness
   int camera_lost = 0;
   bool missing = false;
+  std::stop_token session_end = {};
 };
 
 Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
@@ -98,7 +99,7 @@ Result<RigPort::Opened<drivers::CameraInfo>> Rig::open_camera() {
     --camera_opens_to_fail_;
     return unavailable("simulated camera: unplugged");
   }
-  camera_session_ = ++next_session_;
+  end_camera_session(++next_session_);
   trigger_count_ = 0;
   last_frame_.reset();
   return Opened<drivers::CameraInfo>{camera_session_,
@@ -130,7 +131,13 @@ Result<RigPort::Opened<drivers::ProjectorInfo>> Rig::open_projector() {
 
 void Rig::close_camera(std::uint64_t session) noexcept {
   const std::lock_guard lock(mutex_);
-  if (session == camera_session_) camera_session_ = 0;
+  if (session == camera_session_) end_camera_session(0);
+}
+
+void Rig::end_camera_session(std::uint64_t next) {
+  camera_session_ = next;
+  camera_session_end_.request_stop();
+  camera_session_end_ = {};
 }
 
 void Rig::close_projector(std::uint64_t session) noexcept {
@@ -221,12 +228,13 @@ Result<Rig::Exposure> Rig::trigger(std::uint64_t session,
                                         seconds(camera.longest_exposure)));
   }
   std::unique_lock lock(mutex_);
-  const auto free = [&] { return exposing_session_ != session; };
+  const auto closed = [&] { return session == 0 || session != camera_session_; };
+  const auto free = [&] { return closed() || exposing_session_ != session; };
   if (!exposure_over_.wait_for(lock, stop, kExposureEnds, free)) {
     return stop.stop_requested() ? cancelled("exposure: stopped")
                                  : busy("simulated camera: exposing");
   }
-  if (session == 0 || session != camera_session_) return unavailable("simulated camera: not open");
+  if (closed()) return unavailable("simulated camera: not open");
 
   Exposure e{.session = session, .start = clock_.now(), .requested = requested};
   const Shown shown = timeline_.at(e.start);
@@ -239,6 +247,7 @@ Result<Rig::Exposure> Rig::trigger(std::uint64_t session,
                                         (1.0 + camera.exposure_error * z)));
   e.camera_lost = plan_.strikes_for_good(FaultKind::kCameraLost, id);
   e.missing = plan_.strikes(FaultKind::kMissingFrame, id);
+  e.session_end = camera_session_end_.get_token();
   exposing_session_ = session;
   return e;
 }
@@ -247,11 +256,18 @@ Result<Frame> Rig::expose(std::uint64_t session, nanoseconds exposure, std::stop
   if (stop.stop_requested()) return cancelled("exposure: stopped");
   const Result<Exposure> triggered = trigger(session, exposure, stop);
   if (!triggered) return triggered.error();
+  std::stop_source over;  // as the caller wishes, or because the camera is no longer the caller's
+  const std::stop_callback on_stop(stop, [&] { over.request_stop(); });
+  const std::stop_callback on_end(triggered->session_end, [&] { over.request_stop(); });
   Result<Frame> frame = [&]() -> Result<Frame> {
-    if (triggered->camera_lost > 0 || triggered->missing) return fail_later(*triggered, stop);
-    if (!clock_.sleep(triggered->measured, stop)) return cancelled("exposure: stopped");
+    if (triggered->camera_lost > 0 || triggered->missing)
+      return fail_later(*triggered, over.get_token());
+    if (!clock_.sleep(triggered->measured, over.get_token())) return cancelled("exposure: stopped");
     return finish(*triggered);
   }();
+  if (!frame && frame.error().code == ErrorCode::kCancelled && !stop.stop_requested()) {
+    frame = unavailable("simulated camera: closed, or opened by somebody else");
+  }
   const std::lock_guard lock(mutex_);
   if (exposing_session_ == session) exposing_session_ = 0;
   exposure_over_.notify_all();
@@ -262,7 +278,8 @@ Result<Frame> Rig::fail_later(const Exposure& exposure, std::stop_token stop) {
   if (exposure.camera_lost > 0) {
     if (!clock_.sleep(exposure.measured / 2, stop)) return cancelled("exposure: stopped");
     const std::lock_guard lock(mutex_);
-    camera_session_ = 0;
+    if (camera_session_ != exposure.session) return cancelled("exposure: camera closed");
+    end_camera_session(0);
     camera_opens_to_fail_ = exposure.camera_lost - 1;
     return unavailable("simulated camera: unplugged");
   }
@@ -293,7 +310,7 @@ Result<Frame> Rig::finish(Exposure exposure) {
   frame.bit_depth = options_.camera.bit_depth;
   frame.start = exposure.start;
   frame.exposure = exposure.measured;
-  deliver(exposure, frame);
+  if (auto delivered = deliver(exposure, frame); !delivered) return delivered.error();
   return frame;
 }
 
@@ -315,13 +332,14 @@ Image<std::uint16_t> Rig::picture(const Exposure& exposure,
 }
 
 /// Numbers the frame, and damages it on the way out where a fault says so.
-void Rig::deliver(const Exposure& exposure, Frame& frame) {
+Result<void> Rig::deliver(const Exposure& exposure, Frame& frame) {
   const std::lock_guard lock(mutex_);
+  if (camera_session_ != exposure.session) return cancelled("exposure: camera closed");
   const std::uint64_t id = frame.pattern_id;
   ++exposures_;
   if (last_frame_ && plan_.strikes(FaultKind::kDuplicateFrame, id)) {
     frame = *last_frame_;
-    return;
+    return ok();
   }
   trigger_count_ += plan_.strikes(FaultKind::kSkippedTrigger, id) ? 2 : 1;
   frame.trigger_count = trigger_count_;
@@ -343,6 +361,7 @@ void Rig::deliver(const Exposure& exposure, Frame& frame) {
              id,
              seconds(exposure.measured));
   last_frame_ = intact;
+  return ok();
 }
 
 Result<RigStatus> Rig::status() {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <utility>
 #include <vector>
 
@@ -66,7 +67,8 @@ class Rig : public RigPort {
   Result<Frame> fail_later(const Exposure& exposure, std::stop_token stop);
   Image<std::uint16_t> picture(const Exposure& exposure,
                                const std::vector<LightStretch>& lights) const;
-  void deliver(const Exposure& exposure, Frame& frame);
+  Result<void> deliver(const Exposure& exposure, Frame& frame);
+  void end_camera_session(std::uint64_t next);
   Shown render(const drivers::Pattern& pattern);
   void darken();
 
@@ -84,6 +86,7 @@ class Rig : public RigPort {
       rendered_;  ///< by content
   std::uint64_t next_session_;
   std::uint64_t camera_session_ = 0;     ///< 0: closed
+  std::stop_source camera_session_end_;  ///< wakes the exposure of a session that ends
   std::uint64_t projector_session_ = 0;  ///< 0: closed
   std::uint64_t darkened_ = 0;           ///< how often
   int camera_opens_to_fail_ = 0;

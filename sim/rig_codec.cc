@@ -8,25 +8,29 @@
 #include <string>
 #include <utility>
 
+#include "sim/rig_header.h"
+
 namespace opaline::sim {
 namespace {
 
 using nlohmann::json;
-using std::chrono::nanoseconds;
 
 static_assert(std::endian::native == std::endian::little, "samples are sent as they lie in memory");
 
 constexpr int kLargestSide = 8192;
+constexpr int kMostPatches = 256;  // along a side
 
-/// Runs a decoder; what the JSON library throws at it becomes an error.
-template <class Decode>
-auto checked(Decode decode) -> decltype(decode()) {
-  try {
-    return decode();
-  } catch (const json::exception& wrong) {
-    return invalid_argument(
-        fmt::format("not what was expected from the rig's socket: {}", wrong.what()));
-  }
+/// The value, or what was wrong on the way to it.
+template <class T>
+Result<T> unless_wrong(const RigHeader& header, T value) {
+  if (auto good = header.result(); !good) return good.error();
+  return value;
+}
+
+template <class T>
+void append(RigMessage& message, std::span<const T> values) {
+  const auto bytes = std::as_bytes(values);
+  message.payload.insert(message.payload.end(), bytes.begin(), bytes.end());
 }
 
 template <class T>
@@ -34,31 +38,23 @@ void put_image(RigMessage& message, const Image<T>& image) {
   message.header["width"] = image.width();
   message.header["height"] = image.height();
   message.header["channels"] = image.channels();
-  const auto bytes = std::as_bytes(image.samples());
-  message.payload.assign(bytes.begin(), bytes.end());
+  append(message, std::span<const T>(image.samples()));
 }
 
+/// Of all of `bytes`; nothing is allocated before that is sure.
 template <class T>
-Result<Image<T>> get_image(const RigMessage& message) {
-  const int width = message.header.at("width").get<int>();
-  const int height = message.header.at("height").get<int>();
-  const int channels = message.header.at("channels").get<int>();
-  const auto sane = [](int side) { return side >= 0 && side <= kLargestSide; };
-  if (!sane(width) || !sane(height) || channels < 1 || channels > 4) {
-    return invalid_argument(fmt::format("a picture of {} x {} x {}", width, height, channels));
+Result<Image<T>> get_image(RigHeader& header, std::span<const std::byte> bytes) {
+  const int width = header.whole<int>("width", 0, kLargestSide);
+  const int height = header.whole<int>("height", 0, kLargestSide);
+  const int channels = header.whole<int>("channels", 1, 4);
+  if (auto good = header.result(); !good) return good.error();
+  if (bytes.size() != sizeof(T) * static_cast<std::size_t>(width) * height * channels) {
+    return invalid_argument(fmt::format(
+        "{} bytes for a picture of {} x {} x {}", bytes.size(), width, height, channels));
   }
   Image<T> image(width, height, channels);
-  const auto bytes = std::as_writable_bytes(image.samples());
-  if (bytes.size() != message.payload.size()) {
-    return invalid_argument(fmt::format(
-        "{} bytes for a picture of {} x {} x {}", message.payload.size(), width, height, channels));
-  }
-  if (!bytes.empty()) std::memcpy(bytes.data(), message.payload.data(), bytes.size());
+  if (!bytes.empty()) std::memcpy(image.samples().data(), bytes.data(), bytes.size());
   return image;
-}
-
-nanoseconds get_time(const json& header, const char* name) {
-  return nanoseconds(header.at(name).get<nanoseconds::rep>());
 }
 
 json faults_to_json(const Faults& faults) {
@@ -73,15 +69,17 @@ json faults_to_json(const Faults& faults) {
 }
 
 Result<Faults> faults_from_json(const json& list) {
+  if (!list.is_array()) return invalid_argument("faults: expected a list");
   Faults faults;
   for (const json& item : list) {
-    const auto kind = fault_from_name(item.at("kind").get<std::string>());
+    RigHeader fields(item);
+    const auto kind = fault_from_name(fields.text("kind"));
+    const Fault fault{kind.value_or(FaultKind::kStaleFrame),
+                      fields.whole<std::uint64_t>("pattern"),
+                      fields.whole<int>("skip", 0),
+                      fields.whole<int>("count", 1)};
+    if (auto good = fields.result(); !good) return good.error().in("fault");
     if (!kind) return kind.error();
-    const Fault fault{*kind, item.at("pattern"), item.at("skip"), item.at("count")};
-    if (fault.skip < 0 || fault.count < 1) {
-      return invalid_argument(fmt::format(
-          "fault with skip = {}, count = {}; expected >= 0 and >= 1", fault.skip, fault.count));
-    }
     faults.push_back(fault);
   }
   return faults;
@@ -102,18 +100,17 @@ RigMessage encode(const Frame& frame) {
 }
 
 Result<Frame> decode_frame(const RigMessage& message) {
-  return checked([&]() -> Result<Frame> {
-    const json& header = message.header;
-    auto pixels = get_image<std::uint16_t>(message);
-    if (!pixels) return pixels.error();
-    return Frame{*std::move(pixels),
-                 header.at("bit_depth"),
-                 header.at("pattern_id"),
-                 header.at("trigger_count"),
-                 get_time(header, "start_ns"),
-                 get_time(header, "exposure_ns"),
-                 header.at("sha256")};
-  });
+  RigHeader header(message.header);
+  auto pixels = get_image<std::uint16_t>(header, message.payload);
+  if (!pixels) return pixels.error();
+  return unless_wrong(header,
+                      Frame{*std::move(pixels),
+                            header.whole<int>("bit_depth", 1, 16),
+                            header.whole<std::uint64_t>("pattern_id"),
+                            header.whole<std::uint64_t>("trigger_count"),
+                            header.time("start_ns"),
+                            header.time("exposure_ns"),
+                            header.text("sha256")});
 }
 
 RigMessage encode(const drivers::Pattern& pattern) {
@@ -123,11 +120,11 @@ RigMessage encode(const drivers::Pattern& pattern) {
 }
 
 Result<drivers::Pattern> decode_pattern(const RigMessage& message) {
-  return checked([&]() -> Result<drivers::Pattern> {
-    auto codes = get_image<std::uint8_t>(message);
-    if (!codes) return codes.error();
-    return drivers::Pattern{message.header.at("pattern_id"), *std::move(codes)};
-  });
+  RigHeader header(message.header);
+  auto codes = get_image<std::uint8_t>(header, message.payload);
+  if (!codes) return codes.error();
+  return unless_wrong(
+      header, drivers::Pattern{header.whole<std::uint64_t>("pattern_id"), *std::move(codes)});
 }
 
 RigMessage encode(const RigStatus& status) {
@@ -144,51 +141,60 @@ RigMessage encode(const RigStatus& status) {
 }
 
 Result<RigStatus> decode_status(const RigMessage& message) {
-  return checked([&]() -> Result<RigStatus> {
-    const json& header = message.header;
-    auto faults = faults_from_json(header.at("faults"));
-    if (!faults) return faults.error();
-    return RigStatus{header.at("identity"),
-                     header.at("lamp_on"),
-                     header.at("pattern_id"),
-                     header.at("exposures"),
-                     header.at("camera_open"),
-                     header.at("projector_open"),
-                     get_time(header, "rig_time_ns"),
-                     header.at("time_factor"),
-                     *std::move(faults)};
-  });
+  RigHeader header(message.header);
+  auto faults = faults_from_json(header.find("faults"));
+  if (!faults) return faults.error();
+  return unless_wrong(header,
+                      RigStatus{header.text("identity"),
+                                header.flag("lamp_on"),
+                                header.whole<std::uint64_t>("pattern_id"),
+                                header.whole<std::uint64_t>("exposures"),
+                                header.flag("camera_open"),
+                                header.flag("projector_open"),
+                                header.time("rig_time_ns"),
+                                header.number("time_factor"),
+                                *std::move(faults)});
 }
 
+/// Payload: the patches' irradiance, then the radiance. A header would not hold that of many patches.
 RigMessage encode(const RigTruth& truth) {
   RigMessage message{{{"scene", truth.scene},
                       {"pattern_id", truth.pattern_id},
                       {"patches_x", truth.patches_x},
-                      {"patches_y", truth.patches_y},
-                      {"patch_irradiance", truth.patch_irradiance}},
+                      {"patches_y", truth.patches_y}},
                      {}};
+  append(message, std::span<const Rgb>(truth.patch_irradiance));
   put_image(message, truth.surface_radiance);
   return message;
 }
 
 Result<RigTruth> decode_truth(const RigMessage& message) {
-  return checked([&]() -> Result<RigTruth> {
-    const json& header = message.header;
-    auto radiance = get_image<float>(message);
-    if (!radiance) return radiance.error();
-    return RigTruth{header.at("scene"),
-                    header.at("pattern_id"),
-                    header.at("patches_x"),
-                    header.at("patches_y"),
-                    header.at("patch_irradiance").get<std::vector<Rgb>>(),
-                    *std::move(radiance)};
-  });
+  RigHeader header(message.header);
+  RigTruth truth{header.text("scene"),
+                 header.whole<std::uint64_t>("pattern_id"),
+                 header.whole<int>("patches_x", 0, kMostPatches),
+                 header.whole<int>("patches_y", 0, kMostPatches),
+                 {},
+                 {}};
+  if (auto good = header.result(); !good) return good.error();
+  const std::span<const std::byte> payload = message.payload;
+  const std::size_t patches = static_cast<std::size_t>(truth.patches_x) * truth.patches_y;
+  if (payload.size() < patches * sizeof(Rgb)) {
+    return invalid_argument(fmt::format("{} bytes for {} patches", payload.size(), patches));
+  }
+  truth.patch_irradiance.resize(patches);
+  const auto irradiance = payload.first(patches * sizeof(Rgb));
+  if (patches > 0) std::memcpy(truth.patch_irradiance.data(), irradiance.data(), irradiance.size());
+  auto radiance = get_image<float>(header, payload.subspan(irradiance.size()));
+  if (!radiance) return radiance.error();
+  truth.surface_radiance = *std::move(radiance);
+  return truth;
 }
 
 RigMessage encode(const Faults& faults) { return {{{"faults", faults_to_json(faults)}}, {}}; }
 
 Result<Faults> decode_faults(const RigMessage& message) {
-  return checked([&] { return faults_from_json(message.header.at("faults")); });
+  return faults_from_json(RigHeader(message.header).find("faults"));
 }
 
 RigMessage encode(const RigPort::Opened<drivers::CameraInfo>& opened) {
@@ -204,17 +210,17 @@ RigMessage encode(const RigPort::Opened<drivers::CameraInfo>& opened) {
 }
 
 Result<RigPort::Opened<drivers::CameraInfo>> decode_opened_camera(const RigMessage& message) {
-  return checked([&]() -> Result<RigPort::Opened<drivers::CameraInfo>> {
-    const json& h = message.header;
-    return RigPort::Opened<drivers::CameraInfo>{h.at("session"),
-                                                {h.at("model"),
-                                                 h.at("serial"),
-                                                 h.at("width"),
-                                                 h.at("height"),
-                                                 h.at("bit_depth"),
-                                                 get_time(h, "shortest_exposure_ns"),
-                                                 get_time(h, "longest_exposure_ns")}};
-  });
+  RigHeader header(message.header);
+  return unless_wrong(
+      header,
+      RigPort::Opened<drivers::CameraInfo>{header.whole<std::uint64_t>("session"),
+                                           {header.text("model"),
+                                            header.text("serial"),
+                                            header.whole<int>("width", 1, kLargestSide),
+                                            header.whole<int>("height", 1, kLargestSide),
+                                            header.whole<int>("bit_depth", 1, 16),
+                                            header.time("shortest_exposure_ns"),
+                                            header.time("longest_exposure_ns")}});
 }
 
 RigMessage encode(const RigPort::Opened<drivers::ProjectorInfo>& opened) {
@@ -229,16 +235,16 @@ RigMessage encode(const RigPort::Opened<drivers::ProjectorInfo>& opened) {
 }
 
 Result<RigPort::Opened<drivers::ProjectorInfo>> decode_opened_projector(const RigMessage& message) {
-  return checked([&]() -> Result<RigPort::Opened<drivers::ProjectorInfo>> {
-    const json& h = message.header;
-    return RigPort::Opened<drivers::ProjectorInfo>{h.at("session"),
-                                                   {h.at("model"),
-                                                    h.at("serial"),
-                                                    h.at("width"),
-                                                    h.at("height"),
-                                                    get_time(h, "frame_period_ns"),
-                                                    get_time(h, "latency_ns")}};
-  });
+  RigHeader header(message.header);
+  return unless_wrong(
+      header,
+      RigPort::Opened<drivers::ProjectorInfo>{header.whole<std::uint64_t>("session"),
+                                              {header.text("model"),
+                                               header.text("serial"),
+                                               header.whole<int>("width", 1, kLargestSide),
+                                               header.whole<int>("height", 1, kLargestSide),
+                                               header.time("frame_period_ns"),
+                                               header.time("latency_ns")}});
 }
 
 RigMessage encode(const Error& error) {
@@ -246,16 +252,18 @@ RigMessage encode(const Error& error) {
 }
 
 Result<void> check_reply(const RigMessage& message) {
-  if (!message.header.contains("error")) return ok();
-  return checked([&]() -> Result<void> {
-    const json& error = message.header.at("error");
-    const auto name = error.at("code").get<std::string>();
-    for (int code = 0; code <= static_cast<int>(ErrorCode::kInternal); ++code) {
-      if (to_string(static_cast<ErrorCode>(code)) != name) continue;
-      return Error{static_cast<ErrorCode>(code), error.at("message").get<std::string>()};
+  const RigHeader header(message.header);
+  if (header.find("error").is_null()) return ok();
+  RigHeader error(header.find("error"));
+  const std::string name = error.text("code");
+  const std::string text = error.text("message");
+  if (auto good = error.result(); !good) return good.error();
+  for (int code = 0; code <= static_cast<int>(ErrorCode::kInternal); ++code) {
+    if (to_string(static_cast<ErrorCode>(code)) == name) {
+      return Error{static_cast<ErrorCode>(code), text};
     }
-    return internal_error(fmt::format("{}: {}", name, error.at("message").get<std::string>()));
-  });
+  }
+  return internal_error(fmt::format("{}: {}", name, text));
 }
 
 }  // namespace opaline::sim

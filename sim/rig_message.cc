@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::uint32_t kHeaderLimit = 64u << 10;
 constexpr std::uint32_t kPayloadLimit = 256u << 20;
+constexpr std::size_t kPayloadStep = 1u << 20;  // what is claimed costs memory as it arrives
 constexpr std::size_t kPrefixBytes = 8;
 
 Error last_error(std::string_view doing) {
@@ -164,8 +165,12 @@ Result<RigMessage> receive_message(int socket, Deadline deadline, std::stop_toke
   }
   RigMessage message{nlohmann::json::parse(header, nullptr, false), {}};
   if (!message.header.is_object()) return invalid_argument("not a message: no JSON object");
-  message.payload.resize(payload_bytes);
-  if (auto got = receive_all(socket, message.payload, deadline, stop); !got) return got.error();
+  while (message.payload.size() < payload_bytes) {
+    const std::size_t had = message.payload.size();
+    message.payload.resize(std::min<std::size_t>(payload_bytes, had + kPayloadStep));
+    const auto space = std::span(message.payload).subspan(had);
+    if (auto got = receive_all(socket, space, deadline, stop); !got) return got.error();
+  }
   return message;
 }
 

@@ -9,19 +9,21 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/log.h"
 #include "base/unix_socket.h"
 #include "sim/rig_codec.h"
+#include "sim/rig_header.h"
 
 namespace opaline::sim {
 namespace {
 
 using namespace std::chrono_literals;
-using nlohmann::json;
 
 constexpr std::size_t kConnections = 32;
+constexpr auto kPause = 100ms;
 constexpr std::chrono::seconds kRequestPatience{
     5};  ///< for a client to send or take a whole message
 
@@ -49,12 +51,12 @@ RigMessage reply_to(const Result<T>& value) {
   return value ? encode(*value) : encode(value.error());
 }
 
-std::uint64_t session_of(const RigMessage& request) { return request.header.at("session"); }
-
-RigMessage show(RigPort& rig, const RigMessage& request, const std::stop_token& stop) {
+RigMessage show(RigPort& rig,
+                std::uint64_t session,
+                const RigMessage& request,
+                const std::stop_token& stop) {
   const auto pattern = decode_pattern(request);
-  return pattern ? reply_to(rig.show(session_of(request), *pattern, stop))
-                 : encode(pattern.error());
+  return pattern ? reply_to(rig.show(session, *pattern, stop)) : encode(pattern.error());
 }
 
 RigMessage arm(RigPort& rig, const RigMessage& request) {
@@ -62,19 +64,22 @@ RigMessage arm(RigPort& rig, const RigMessage& request) {
   return faults ? reply_to(rig.arm(*faults)) : encode(faults.error());
 }
 
-/// Does what a request asks for. May throw what the JSON library throws.
+/// Does what a request asks for.
 RigMessage perform(RigPort& rig, const RigMessage& request, const std::stop_token& stop) {
-  const std::string what = request.header.at("do");
+  RigHeader header(request.header);
+  const std::string what = header.text("do");
+  const auto session = request.header.contains("session") ? header.whole<std::uint64_t>("session")
+                                                          : RigPort::kAnybody;
+  const std::chrono::nanoseconds exposure =
+      what == "expose" ? header.time("exposure_ns") : std::chrono::nanoseconds(0);
+  if (auto good = header.result(); !good) return encode(good.error());
   if (what == "open_camera") return reply_to(rig.open_camera());
   if (what == "open_projector") return reply_to(rig.open_projector());
-  if (what == "expose") {
-    const std::chrono::nanoseconds exposure(request.header.at("exposure_ns").get<std::int64_t>());
-    return reply_to(rig.expose(session_of(request), exposure, stop));
-  }
-  if (what == "show") return show(rig, request, stop);
-  if (what == "close_camera") return rig.close_camera(session_of(request)), RigMessage{};
-  if (what == "close_projector") return rig.close_projector(session_of(request)), RigMessage{};
-  if (what == "dark") return reply_to(rig.dark(session_of(request)));
+  if (what == "expose") return reply_to(rig.expose(session, exposure, stop));
+  if (what == "show") return show(rig, session, request, stop);
+  if (what == "close_camera") return rig.close_camera(session), RigMessage{};
+  if (what == "close_projector") return rig.close_projector(session), RigMessage{};
+  if (what == "dark") return reply_to(rig.dark(session));
   if (what == "status") return reply_to(rig.status());
   if (what == "truth") return reply_to(rig.truth());
   if (what == "arm") return arm(rig, request);
@@ -107,7 +112,7 @@ Result<void> RigServer::serve(std::chrono::nanoseconds idle, std::stop_token sto
   while (!ending_ && !idle_for(idle)) {
     const auto ready =
         wait_for(listener_.get(), POLLIN, std::chrono::steady_clock::now() + 500ms, stop);
-    if (ready) accept_one();
+    if (ready) accept_one(stop);
     if (!ready && ready.error().code == ErrorCode::kCancelled) break;
     if (!ready && ready.error().code != ErrorCode::kTimeout) return ready.error();
     connections_.remove_if([](const Connection& connection) { return connection.over.load(); });
@@ -116,8 +121,15 @@ Result<void> RigServer::serve(std::chrono::nanoseconds idle, std::stop_token sto
   return ok();
 }
 
-void RigServer::accept_one() {
+void RigServer::accept_one(const std::stop_token& stop) {
   FileDescriptor socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket && (errno == EMFILE || errno == ENFILE || errno == ENOMEM)) {
+    log::warning("simulated rig: cannot accept a client: {}",
+                 std::generic_category().message(errno));
+    // The client stays in the queue: without a pause we would ask for it again at once, for ever.
+    const auto paused = wait_for(-1, 0, std::chrono::steady_clock::now() + kPause, stop);
+    if (!paused) return;
+  }
   if (!socket) return;
   last_request_ = std::chrono::steady_clock::now();
   if (connections_.size() >= kConnections) {
@@ -125,29 +137,42 @@ void RigServer::accept_one() {
     return;
   }
   Connection& connection = connections_.emplace_back();
-  connection.thread =
-      std::jthread([this, &connection, socket = std::move(socket)](std::stop_token stop) {
-        answer(socket.get(), std::move(stop));
-        connection.over = true;
-      });
+  try {
+    connection.thread =
+        std::jthread([this, &connection, socket = std::move(socket)](std::stop_token ending) {
+          answer(socket.get(), std::move(ending));
+          connection.over = true;
+        });
+  } catch (const std::system_error& failure) {  // no more threads
+    log::warning("simulated rig: {}, a client refused", failure.what());
+    connections_.pop_back();
+  }
 }
 
-void RigServer::answer(int connection, std::stop_token stop) {
-  const auto request = receive_message(connection, soon(), stop);
-  if (!request) return log::debug("simulated rig: {}", request.error().message);
-  RigMessage reply;
+/// A connection's outermost function.
+void RigServer::answer(int connection, std::stop_token stop) noexcept {
   try {
-    const HangUpWatch watch(connection, stop);
-    reply = respond(*request, watch.token());
-  } catch (const json::exception& wrong) {
-    reply = encode(invalid_argument(fmt::format("malformed request: {}", wrong.what())));
+    const auto answered = exchange(connection, stop);
+    if (!answered) log::debug("simulated rig: {}", answered.error().message);
+  } catch (const std::exception& failure) {
+    log::error("simulated rig: a request failed: {}", failure.what());
   }
-  const auto sent = send_message(connection, reply, soon(), stop);
-  if (!sent) log::debug("simulated rig: {}", sent.error().message);
+}
+
+Result<void> RigServer::exchange(int connection, const std::stop_token& stop) {
+  const auto request = receive_message(connection, soon(), stop);
+  if (!request) return request.error();
+  const RigMessage reply = [&] {
+    const HangUpWatch watch(connection, stop);
+    return respond(*request, watch.token());
+  }();
+  auto sent = send_message(connection, reply, soon(), stop);
+  if (sent || sent.error().code != ErrorCode::kInvalidArgument) return sent;
+  return send_message(connection, encode(sent.error().in("reply")), soon(), stop);  // too large
 }
 
 RigMessage RigServer::respond(const RigMessage& request, const std::stop_token& stop) {
-  if (request.header.at("do") != "end") return perform(rig_, request, stop);
+  if (RigHeader(request.header).find("do") != "end") return perform(rig_, request, stop);
   ending_ = true;
   return reply_to(rig_.dark(RigPort::kAnybody));
 }

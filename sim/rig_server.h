@@ -42,9 +42,10 @@ class RigServer {
         lock_(std::move(lock)),
         listener_(std::move(listener)) {}
 
-  void accept_one();
+  void accept_one(const std::stop_token& stop);
   RigMessage respond(const RigMessage& request, const std::stop_token& stop);
-  void answer(int connection, std::stop_token stop);
+  void answer(int connection, std::stop_token stop) noexcept;
+  Result<void> exchange(int connection, const std::stop_token& stop);
   bool idle_for(std::chrono::nanoseconds idle);
 
   RigPort& rig_;

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <exception>
 #include <string_view>
 
 #include "base/log.h"
@@ -10,7 +11,9 @@
 // opaline-guardian SESSION_DIR: started by opaline-capture, never by hand. Makes the session's light source dark when
 // its standard input ends, which it does when the capture does.
 
-int main(int argc, char** argv) {
+namespace {
+
+int run_program(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]).starts_with('-')) {
     std::fputs("Usage: opaline-guardian SESSION_DIR (opaline-capture starts it)\n", stderr);
     return 2;
@@ -27,4 +30,15 @@ int main(int argc, char** argv) {
   }
   return opaline::daemon::guard(opaline::daemon::guardian_lock_path(config->rig.station),
                                 opaline::daemon::light_switch(config->rig));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+    return 1;
+  }
 }

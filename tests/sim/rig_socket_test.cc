@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -170,6 +171,13 @@ TEST_F(RigSocketTest, NonsenseOnTheSocketHurtsNobody) {
         R"({"do":7})",
         R"({})",
         R"({"do":"expose","session":"x"})",
+        R"({"do":"dark","session":-1})",
+        R"({"do":"expose","session":1.5,"exposure_ns":1})",
+        R"({"do":"expose","session":1,"exposure_ns":1e30})",
+        R"({"do":"arm","faults":[{"kind":"torn_frame","pattern":0,"skip":0,"count":4294967297}]})",
+        R"({"do":"arm","faults":{"kind":7}})",
+        R"({"do":"show","session":1,"pattern_id":1,"width":4294967305,"height":9,"channels":3})",
+        R"({"do":"show","session":1,"pattern_id":1,"width":8192,"height":8192,"channels":4})",
         R"({"do":"show","session":1,"pattern_id":1,"width":9,"height":9,"channels":3})"}) {
     const auto connection = connect_unix(socket_);
     ASSERT_TRUE(connection);
@@ -179,6 +187,58 @@ TEST_F(RigSocketTest, NonsenseOnTheSocketHurtsNobody) {
     EXPECT_EQ(check_reply(*reply).error().code, ErrorCode::kInvalidArgument) << header;
   }
   EXPECT_TRUE(RigClient(socket_).status());
+}
+
+/// The most memory this process has had, KiB.
+long peak_memory() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
+}
+
+TEST_F(RigSocketTest, ClaimedBytesCostNothingUntilTheyCome) {
+  serve();
+  const long before = peak_memory();
+  std::vector<FileDescriptor> connections;
+  for (int i = 0; i < 8; ++i) {  // each claims a payload of 256 MiB and sends none
+    connections.push_back(*connect_unix(socket_));
+    const std::string claim("\x02\0\0\0\0\0\0\x10{}", 10);
+    ASSERT_EQ(::send(connections.back().get(), claim.data(), claim.size(), MSG_NOSIGNAL), 10);
+  }
+  EXPECT_TRUE(RigClient(socket_).status());
+  std::this_thread::sleep_for(50ms);  // for the others to be read
+  EXPECT_LT(peak_memory() - before, 64 << 10);
+}
+
+TEST_F(RigSocketTest, TheTruthOfManyPatchesIsReadable) {
+  TransportResponses many = *support::tiny_responses();
+  many.patches_x = many.patches_y = 64;
+  many.patches.assign(64 * 64, many.patches.front());
+  rig_ = *Rig::create(options_, std::make_shared<const TransportResponses>(std::move(many)));
+  auto made = RigServer::create(*rig_, socket_);
+  ASSERT_TRUE(made);
+  server_ = *std::move(made);
+  serving_ = std::jthread([this](std::stop_token stop) { served_ = server_->serve(1h, stop); });
+  RigClient client(socket_);
+  const auto opened = client.open_projector();
+  ASSERT_TRUE(opened);
+  ASSERT_TRUE(client.show(opened->session, support::flat_pattern(options_, 1, 255), {}));
+  std::this_thread::sleep_for(1ms);  // a second of the rig's time: the light has followed
+  const auto truth = client.truth();
+  ASSERT_TRUE(truth) << truth.error().message;
+  ASSERT_EQ(truth->patch_irradiance.size(), 64u * 64u);
+  EXPECT_EQ(truth->patch_irradiance, rig_->truth()->patch_irradiance);
+  EXPECT_GT(truth->patch_irradiance[2000][1], 0.0);
+  EXPECT_EQ(truth->surface_radiance, rig_->truth()->surface_radiance);
+}
+
+TEST_F(RigSocketTest, AReplyThatIsTooLargeIsAnswered) {
+  options_.identity = std::string(100'000, 'x');  // a header holds 64 KiB
+  serve();
+  const auto status = RigClient(socket_).status();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("reply"));
 }
 
 TEST_F(RigSocketTest, EndsByItselfWhenIdleAndDarkOnly) {

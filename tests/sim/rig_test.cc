@@ -199,6 +199,34 @@ TEST_F(RigTest, OpeningTakesTheDeviceFromWhoeverHadIt) {
   EXPECT_TRUE(other.capture({kTurn, 0}, {}));
 }
 
+TEST_F(RigTest, OpeningTakesTheDeviceFromAnExposureUnderWay) {
+  options_.time_factor = 1.0;
+  auto made = Rig::create(options_, support::tiny_responses());  // in real time
+  ASSERT_TRUE(made);
+  SimCamera camera(**made);
+  ASSERT_TRUE(camera.open());
+  Result<Frame> frame = Frame{};
+  const auto start = std::chrono::steady_clock::now();
+  {
+    std::jthread exposing([&] { frame = camera.capture({8s, 0}, {}); });
+    std::this_thread::sleep_for(20ms);
+    SimCamera other(**made);
+    ASSERT_TRUE(other.open());
+    exposing.join();
+    EXPECT_TRUE(other.info());
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 4s);  // woken, and a busy machine
+  ASSERT_FALSE(frame);
+  EXPECT_EQ(frame.error().code, ErrorCode::kUnavailable);  // nobody asked it to stop
+  EXPECT_FALSE(camera.info());
+}
+
+TEST_F(RigTest, NobodysSessionExposesNothing) {
+  const auto frame = rig_->expose(0, kTurn, {});
+  ASSERT_FALSE(frame);
+  EXPECT_EQ(frame.error().code, ErrorCode::kUnavailable);
+}
+
 TEST_F(RigTest, ResponsesThatDoNotFitAreRefused) {
   auto responses = *support::tiny_responses();
   responses.patches.pop_back();
