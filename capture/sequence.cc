@@ -68,9 +68,11 @@ class Sequence {
     bool lit = true;
   };
   Result<void> prepare(std::stop_token stop);
+  Result<void> note_plan();
   Result<void> check_space() const;
-  Result<RegionTaker*> taker();
+  Result<RegionTaker*> taker(std::stop_token stop);
   Result<void> take_black(std::stop_token stop);
+  void use_black(std::vector<CapturedFrame> frames);
   Result<void> do_light(const Light& light, std::stop_token stop);
   /// None when the light is to be taken.
   Result<std::vector<CapturedFrame>> load(const std::string& name, const drivers::Pattern& pattern);
@@ -80,6 +82,7 @@ class Sequence {
   Result<std::vector<ExposurePair>> pairs_of(const std::string& name,
                                              std::span<const CapturedFrame> frames) const;
   bool shows_light(std::span<const ExposurePair> pairs) const;
+  std::string why_masked(const HdrImage& hdr) const;
   Result<void> note_unusable(const Light& light, std::string_view why);
   Result<void> finish();
   void report(const std::string& region, std::optional<nanoseconds> exposure) const;
@@ -114,25 +117,47 @@ Result<void> Sequence::prepare(std::stop_token stop) {
   for (const fs::path& directory : {store_.directory(), work_.directory / "hdr"}) {
     if (auto made = work_.files.make_directories(directory); !made) return made;
   }
-  const auto count = [&](bool held_out) {
-    return std::ranges::count(patterns_.lights, held_out, &Light::held_out);
-  };
-  auto noted =
-      work_.events.fact("capture.planned", {{"regions", count(false)}, {"held_out", count(true)}});
-  if (!noted) return noted;
-  if (auto black = take_black(stop); !black) return black;
-  merge_.emplace(task_.calibration.camera, black_.hot());
+  remove_partial_files(work_.files, work_.directory);
+  if (auto noted = note_plan(); !noted) return noted;
+  auto stored = load(kBlackName, patterns_.black);
+  if (!stored) return stored.error();
+  if (!stored->empty()) use_black(*std::move(stored));
+  const bool complete = std::ranges::all_of(
+      patterns_.lights, [this](const Light& light) { return store_.has(light.name); });
+  if (complete && !black_.empty()) return ok();
+  if (auto devices = taker(stop); !devices) return devices.error();
   return ok();
 }
 
-// The devices are opened only when something is left to take.
-Result<RegionTaker*> Sequence::taker() {
+Result<void> Sequence::note_plan() {
+  const auto held_out = std::ranges::count(patterns_.lights, true, &Light::held_out);
+  const auto regions = std::ssize(patterns_.lights) - held_out;
+  if (held_out < task_.options.patterns.held_out_lights) {
+    log::warning("{} held-out lights instead of {}: no more of them differ on {} regions",
+                 held_out,
+                 task_.options.patterns.held_out_lights,
+                 regions);
+  }
+  return work_.events.fact("capture.planned", {{"regions", regions}, {"held_out", held_out}});
+}
+
+void Sequence::use_black(std::vector<CapturedFrame> frames) {
+  black_ = BlackFrames(std::move(frames), task_.calibration.camera, map_.footprint());
+  merge_.emplace(task_.calibration.camera, black_.hot());
+}
+
+// The devices are opened only when something is left to take. Where they, or the options, expose
+// otherwise than before, so must the black frames.
+Result<RegionTaker*> Sequence::taker(std::stop_token stop) {
   if (taker_) return taker_.get();
   auto made =
       RegionTaker::create(station_, {task_.options, task_.calibration.camera}, work_.events);
   if (!made) return made.error();
   taker_ = *std::move(made);
   if (auto space = check_space(); !space) return space.error();
+  if (!black_.cover(taker_->ladder())) {
+    if (auto black = take_black(stop); !black) return black.error();
+  }
   return taker_.get();
 }
 
@@ -180,19 +205,11 @@ Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,
 }
 
 Result<void> Sequence::take_black(std::stop_token stop) {
-  auto stored = load(kBlackName, patterns_.black);
-  if (!stored) return stored.error();
-  if (!stored->empty()) {
-    black_ = BlackFrames(*std::move(stored), task_.calibration.camera, map_.footprint());
-    return ok();
-  }
-  auto devices = taker();
-  if (!devices) return devices.error();
-  auto taken = (*devices)->take_black(
+  auto taken = taker_->take_black(
       patterns_.black, [this](nanoseconds exposure) { report(kBlackName, exposure); }, stop);
   if (!taken) return taken.error();
   if (auto saved = store_.save(kBlackName, patterns_.black, taken->frames); !saved) return saved;
-  black_ = BlackFrames(std::move(taken->frames), task_.calibration.camera, map_.footprint());
+  use_black(std::move(taken->frames));
   return ok();
 }
 
@@ -222,7 +239,9 @@ bool Sequence::shows_light(std::span<const ExposurePair> pairs) const {
 Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token stop) {
   auto stored = load(light.name, light.pattern);
   if (!stored) return stored.error();
-  if (stored->empty()) return take(light, stop);
+  std::vector<nanoseconds> exposures;
+  for (const CapturedFrame& frame : *stored) exposures.push_back(frame.exposure_asked);
+  if (stored->empty() || !black_.cover(exposures)) return take(light, stop);
   Frames found{*std::move(stored)};
   const auto pairs = pairs_of(light.name, found.frames);
   if (!pairs) return pairs.error();
@@ -231,7 +250,7 @@ Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token
 }
 
 Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop) {
-  auto devices = taker();
+  auto devices = taker(stop);
   if (!devices) return devices.error();
   auto taken = (*devices)->take_light(
       light.name,
@@ -306,11 +325,27 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
         "it is black at every exposure though the lamp works: is the sample opaque "
         "there, or something in the light's way?");
   }
-  if (any_set(surface.mask)) return ok();
-  return note_unusable(
-      light,
-      "every pixel is saturated even at the shortest exposure: close the aperture or "
-      "dim the lamp, bring the calibration up to date, and start a new session");
+  return any_set(surface.mask) ? ok() : note_unusable(light, why_masked(hdr));
+}
+
+std::string Sequence::why_masked(const HdrImage& hdr) const {
+  const auto seen = black_.footprint().samples();
+  const auto pixels = std::ranges::count_if(seen, [](std::uint8_t s) { return s != 0; });
+  std::ptrdiff_t saturated = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i] != 0 && hdr.saturated.samples()[i] != 0) ++saturated;
+  }
+  if (pixels > 0 && saturated == pixels) {
+    return "every pixel is saturated even at the shortest exposure: close the aperture or dim the "
+           "lamp, bring the calibration up to date, and start a new session";
+  }
+  return fmt::format(
+      "no surface cell has {:.0f} % of its area on usable pixels ({} of the {} on the sample are "
+      "saturated): lower capture.min_coverage, take fewer cells, or bring the camera nearer, and "
+      "start a new session",
+      100.0 * task_.options.min_coverage,
+      saturated,
+      pixels);
 }
 
 Result<void> Sequence::finish() {
@@ -328,8 +363,8 @@ void Sequence::report(const std::string& region, std::optional<nanoseconds> expo
   const auto total = static_cast<double>(patterns_.lights.size());
   Progress progress{"capture", summary_.lights / total, std::nullopt, nlohmann::json::object()};
   progress.detail = {
-      {"region", region}, {"index", summary_.lights + 1}, {"total", patterns_.lights.size()}};
-  if (exposure) progress.detail["exposure_s"] = seconds(*exposure);
+      {"light", summary_.lights + 1}, {"lights", patterns_.lights.size()}, {"region", region}};
+  if (exposure) progress.detail["exposure"] = fmt::format("{:.3g} s", seconds(*exposure));
   if (summary_.taken > 0) {
     const double elapsed = seconds(station_.clock.now() - started_);
     progress.seconds_left = elapsed / summary_.taken * (total - summary_.lights);

@@ -37,7 +37,7 @@ struct CaptureSummary {
   int lights = 0;                     ///< regions and held-out lights
   int taken = 0;                      ///< in this run, black frames not counted
   int retaken = 0;                    ///< times that a light was taken again for a bad frame
-  std::vector<std::string> unusable;  ///< lights that show nothing but clipped or black pixels
+  std::vector<std::string> unusable;  ///< lights without one usable cell: clipped, black, uncovered
 };
 
 /// Captures a session, or what is left of it: black frames, then every light; frames/, hdr/ and at
@@ -47,11 +47,13 @@ struct CaptureSummary {
 /// frames. The lamp is dark when it returns.
 ///
 /// A light clipped all over even at the shortest exposure, or black while the lamp is seen to work,
-/// is masked and the session goes on, until fewer than `usable_share` of the regions could be used.
-/// A dead lamp stops it at once.
+/// is masked and the session goes on, until fewer than `usable_share` of the regions can be used.
+/// A dead lamp stops it at once. Lights that were taken at other exposures than the black frames,
+/// since options or devices have changed, are taken again.
 ///
 /// Facts: capture.planned, region.captured, region.retaken, region.damaged, region.unusable,
-/// capture.completed. Progress: step "capture", detail {region, index, total, exposure_s}.
+/// capture.completed. Progress: step "capture", detail {light, lights, region, exposure}:
+/// "region_1_2", the fifth of 24, exposed for "0.5 s".
 /// Errors: kInvalidArgument for options, calibration or geometry; kUnavailable for devices, disk or
 /// lamp, with the remedy; kTimeout; kCancelled.
 Result<CaptureSummary> capture_session(const CaptureTask& task,

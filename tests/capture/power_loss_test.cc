@@ -55,7 +55,6 @@ std::vector<std::pair<std::string, std::vector<std::byte>>> results_of(const fs:
     EXPECT_TRUE(bytes) << bytes.error().message;
     if (bytes) results.emplace_back(name, *bytes);
   }
-  std::erase_if(results, [](const auto& file) { return file.first.ends_with(".partial"); });
   return results;
 }
 

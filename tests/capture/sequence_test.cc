@@ -292,6 +292,18 @@ TEST_F(SequenceTest, RetakesBlackFramesThatWereDamaged) {
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
 }
 
+TEST_F(SequenceTest, TakesAgainWhatWasExposedOtherwise) {
+  ASSERT_TRUE(run(dir_.path()));
+  task_.options.exposures.ratio = 3.0;
+  const testing::TemporaryDirectory undisturbed;
+  ASSERT_TRUE(run(undisturbed.path()));
+  fs::remove(dir_.path() / "frames" / "region_1_1" / "index.json");
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 11);
+  EXPECT_EQ(results_of(dir_.path()), results_of(undisturbed.path()));
+}
+
 TEST_F(SequenceTest, SaysBeforehandThatTheDiskIsTooFullAndGoesOnOnceThereIsRoom) {
   free_bytes_ = [](const fs::path&) -> Result<std::uint64_t> { return 100'000; };
   const auto summary = run(dir_.path());
@@ -390,6 +402,20 @@ TEST_F(SequenceTest, StopsWhenTooManyRegionsAreSaturatedAndSaysWhatWouldHelp) {
   EXPECT_EQ(events_->facts("region.unusable").size(), 3u);
 }
 
+TEST_F(SequenceTest, TellsTooFewPixelsFromSaturatedOnes) {
+  for (int y = 0; y < 64; y += 4) {  // one at least in every cell of 5 x 5 pixels
+    for (int x = 0; x < 64; x += 4) task_.calibration.camera.hot_pixels.emplace_back(x, y);
+  }
+  task_.options.min_coverage = 1.0;
+  const auto summary = run(dir_.path());
+  ASSERT_FALSE(summary);
+  EXPECT_THAT(summary.error().message,
+              AllOf(HasSubstr("3 of 4 regions"),
+                    HasSubstr("min_coverage"),
+                    HasSubstr("100 % of its area"),
+                    HasSubstr("(0 of the")));
+}
+
 TEST_F(SequenceTest, SeesThatPixelsAreFullBelowTheHighestCode) {
   options_.camera.sensitivity = {1e13, 1e13, 1e13};
   options_.camera.full_well_electrons = 5000.0;  // half the codes
@@ -467,7 +493,12 @@ TEST_F(SequenceTest, TellsHowFarItIs) {
   EXPECT_EQ(all.back().step, "capture");
   EXPECT_GT(all.back().fraction, 0.9);
   EXPECT_TRUE(all.back().seconds_left.has_value());
-  EXPECT_EQ(all.back().detail["total"], 11);
+  EXPECT_EQ(all.back().detail["light"], 11);
+  EXPECT_EQ(all.back().detail["lights"], 11);
+  EXPECT_EQ(all.back().detail["region"], "held_out_small_2");
+  EXPECT_TRUE(all.back().detail.contains("exposure"));
+  EXPECT_EQ(all.front().detail["region"], "black");
+  EXPECT_EQ(all.front().detail["exposure"], "0.0333 s");
   EXPECT_TRUE(std::ranges::is_sorted(all, {}, &Progress::fraction));
 }
 
