@@ -11,11 +11,14 @@
 #include <system_error>
 
 #include "base/file_descriptor.h"
+#include "base/log.h"
 
 namespace opaline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::string_view kPartial = ".partial";
 
 Error system_error(std::string_view doing, const fs::path& path, int code) {
   std::string message =
@@ -93,10 +96,9 @@ class SystemFiles final : public FileOperations {
     struct stat before {};
     if (::fstat(fd->get(), &before) != 0) return system_error("append to", path, errno);
     if (const int code = write_all(fd->get(), bytes); code != 0) {
-      if (::ftruncate(fd->get(), before.st_size) != 0) {
-        return system_error("undo a partial append to", path, errno);
-      }
-      return system_error(fmt::format("append {} bytes to", bytes.size()), path, code);
+      Error error = system_error(fmt::format("append {} bytes to", bytes.size()), path, code);
+      if (::ftruncate(fd->get(), before.st_size) != 0) error.message += "; a part of them remains";
+      return error;
     }
     return ok();
   }
@@ -150,10 +152,15 @@ FileOperations& system_files() {
 Result<void> write_whole(FileOperations& files,
                          const fs::path& path,
                          std::span<const std::byte> bytes) {
-  const fs::path temporary = path.parent_path() / ("." + path.filename().string() + ".partial");
+  const fs::path temporary =
+      path.parent_path() / ("." + path.filename().string() + std::string(kPartial));
   if (auto written = files.write(temporary, bytes); !written) return written;
-  if (auto synced = files.sync(temporary); !synced) return synced;
-  if (auto renamed = files.rename(temporary, path); !renamed) return renamed;
+  auto moved = files.sync(temporary);
+  if (moved) moved = files.rename(temporary, path);
+  if (!moved) {
+    if (auto removed = files.remove(temporary); !removed) log::debug("{}", removed.error().message);
+    return moved;
+  }
   return files.sync_directory(path.has_parent_path() ? path.parent_path() : fs::path("."));
 }
 
@@ -161,12 +168,28 @@ Result<void> write_whole(FileOperations& files, const fs::path& path, std::strin
   return write_whole(files, path, std::as_bytes(std::span(text.data(), text.size())));
 }
 
+void remove_partial_files(FileOperations& files, const fs::path& directory) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with('.') && name.ends_with(kPartial)) found.push_back(entry->path());
+  }
+  for (const fs::path& path : found) {
+    if (auto removed = files.remove(path); !removed) log::warning("{}", removed.error().message);
+  }
+}
+
 Result<std::vector<std::byte>> read_bytes(const fs::path& path, std::size_t limit) {
-  const Result<FileDescriptor> fd = open_file("read", path, O_RDONLY);
+  const Result<FileDescriptor> fd = open_file("read", path, O_RDONLY | O_NONBLOCK);
   if (!fd) return fd.error();
   struct stat status {};
   if (::fstat(fd->get(), &status) != 0) return system_error("read", path, errno);
   if (S_ISDIR(status.st_mode)) return system_error("read", path, EISDIR);
+  if (!S_ISREG(status.st_mode)) {
+    return invalid_argument(fmt::format("cannot read {}: it is no regular file", path.string()));
+  }
   std::vector<std::byte> bytes(std::min(static_cast<std::size_t>(status.st_size), limit) + 1);
   std::size_t size = 0;
   for (;;) {

@@ -55,7 +55,12 @@ Result<void> write_whole(FileOperations& files,
                          const std::filesystem::path& path,
                          std::string_view text);
 
-/// Reads a whole file of at most `limit` bytes; a longer one is kInvalidArgument.
+/// Removes the temporaries that write_whole() left anywhere below a directory when its process died.
+/// Only for whoever may write there alone.
+void remove_partial_files(FileOperations& files, const std::filesystem::path& directory);
+
+/// Reads a whole file of at most `limit` bytes; a longer one is kInvalidArgument, and so is what is no
+/// regular file (a pipe would keep us waiting).
 Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::size_t limit);
 Result<std::string> read_text(const std::filesystem::path& path, std::size_t limit = 16u << 20);
 

@@ -12,7 +12,8 @@ namespace opaline {
 /// exec.
 class FileLock {
  public:
-  /// Creates the file if needed. kBusy at once when somebody holds the lock.
+  /// Creates the file if needed, for every user to lock; follows no link. kBusy at once when
+  /// somebody holds the lock.
   static Result<FileLock> acquire(const std::filesystem::path& path);
   /// Whether somebody holds it; asks without taking it. A missing file is not held.
   static Result<bool> is_held(const std::filesystem::path& path);

@@ -14,6 +14,7 @@
 namespace opaline {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class FilesTest : public ::testing::Test {
@@ -69,6 +70,45 @@ TEST_F(FilesTest, RefusesAFileLongerThanTheLimit) {
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST_F(FilesTest, RefusesToReadAPipe) {
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  const auto refused = read_text(path_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr(path_.string()));
+}
+
+// /dev/full is as full as a disk gets.
+TEST_F(FilesTest, SaysWhatToDoWhenTheDiskIsFull) {
+  std::filesystem::create_symlink("/dev/full", path_);
+  const std::vector<std::byte> bytes(5000);
+  for (const auto& failed :
+       {system_files().append(path_, bytes), system_files().write(path_, bytes)}) {
+    ASSERT_FALSE(failed);
+    EXPECT_EQ(failed.error().code, ErrorCode::kUnavailable);
+    EXPECT_THAT(failed.error().message,
+                AllOf(HasSubstr("5000 bytes to " + path_.string()),
+                      HasSubstr("No space left on device"),
+                      HasSubstr("free some space and start again")));
+  }
+}
+
+TEST_F(FilesTest, RemovesWhatWritesCutShortLeftBehind) {
+  ASSERT_TRUE(system_files().make_directories(directory_.path() / "a"));
+  const std::vector<std::byte> bytes(5);
+  ASSERT_TRUE(system_files().write(directory_.path() / "a" / ".b.exr.partial", bytes));
+  ASSERT_TRUE(system_files().write(directory_.path() / "a" / "b.exr.partial", bytes));
+  ASSERT_TRUE(system_files().write(directory_.path() / ".c", bytes));
+  remove_partial_files(system_files(), directory_.path());
+  EXPECT_FALSE(std::filesystem::exists(directory_.path() / "a" / ".b.exr.partial"));
+  EXPECT_TRUE(std::filesystem::exists(directory_.path() / "a" / "b.exr.partial"));
+  EXPECT_TRUE(std::filesystem::exists(directory_.path() / ".c"));
+
+  std::filesystem::create_directory(path_);  // nothing can be renamed to it
+  EXPECT_FALSE(write_whole(system_files(), path_, "text"));
+  EXPECT_FALSE(std::filesystem::exists(directory_.path() / ".file.partial"));
+}
+
 TEST_F(FilesTest, SaysWhichFileIsMissing) {
   const auto missing = read_text(path_);
   ASSERT_FALSE(missing);
@@ -88,6 +128,21 @@ TEST_F(FilesTest, LockExcludesASecondHolderAndIsSeenWithoutBeingTaken) {
   }
   EXPECT_FALSE(FileLock::is_held(path_).value());
   EXPECT_TRUE(FileLock::acquire(path_));
+}
+
+TEST_F(FilesTest, LockIsMadeForEveryUserAndFollowsNoLink) {
+  const mode_t before = ::umask(077);
+  ASSERT_TRUE(FileLock::acquire(path_));
+  ::umask(before);
+  struct stat status {};
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0666u);
+
+  const auto target = directory_.path() / "elsewhere";
+  const auto link = directory_.path() / "link";
+  std::filesystem::create_symlink(target, link);
+  EXPECT_FALSE(FileLock::acquire(link));
+  EXPECT_FALSE(std::filesystem::exists(target));
 }
 
 TEST_F(FilesTest, LockDiesWithItsProcess) {
