@@ -31,7 +31,7 @@ int pidfd_send_signal(int process, int number) {
 
 // Who called listen() on the job's socket; also of a process that is stopped.
 Result<pid_t> listener_at(const std::filesystem::path& socket) {
-  const Result<FileDescriptor> connection = connect_unix(socket);
+  const Result<FileDescriptor> connection = connect_unix(socket, kControlDeadline);
   if (!connection) return connection.error();
   struct ucred peer {};
   socklen_t size = sizeof peer;
