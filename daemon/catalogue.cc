@@ -50,6 +50,7 @@ class Statement {
     const auto* text = ::sqlite3_column_text(statement_, column);
     return text == nullptr ? "" : reinterpret_cast<const char*>(text);
   }
+  std::int64_t number(int column) const { return ::sqlite3_column_int64(statement_, column); }
   CatalogueEntry entry() const { return {text(0), text(1), text(2), text(3), text(4)}; }
 
  private:
@@ -155,6 +156,18 @@ Result<std::optional<CatalogueEntry>> Catalogue::find(const std::string& id) {
   const Result<bool> row = statement.step();
   if (!row) return row.error();
   return *row ? std::optional(statement.entry()) : std::nullopt;
+}
+
+Result<std::map<std::string, std::int64_t>> Catalogue::counts() {
+  const std::lock_guard lock(mutex_);
+  Statement statement(database_, "SELECT state, COUNT(*) FROM sessions GROUP BY state", {});
+  std::map<std::string, std::int64_t> counts;
+  for (;;) {
+    const Result<bool> row = statement.step();
+    if (!row) return row.error();
+    if (!*row) return counts;
+    counts[statement.text(0)] = statement.number(1);
+  }
 }
 
 Result<std::vector<CatalogueEntry>> Catalogue::list(int limit) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -38,6 +40,8 @@ class Catalogue {
   Result<void> set_state(const std::string& id, const std::string& state);
   Result<void> remove(const std::string& id);
   Result<std::optional<CatalogueEntry>> find(const std::string& id);
+  /// How many sessions are in each state.
+  Result<std::map<std::string, std::int64_t>> counts();
   /// The newest first, at most `limit`.
   Result<std::vector<CatalogueEntry>> list(int limit);
 

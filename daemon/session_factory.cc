@@ -9,7 +9,6 @@
 #include <random>
 
 #include "base/lock.h"
-#include "base/log.h"
 
 namespace opaline::daemon {
 namespace {
@@ -67,26 +66,24 @@ Result<SessionDirectory> make_session(FileOperations& files,
   return SessionDirectory::open(root / id);
 }
 
-Result<void> remove_session(FileOperations& files, const SessionDirectory& session) {
+Result<fs::path> hide_session(FileOperations& files, const SessionDirectory& session) {
   const Result<FileLock> lock = FileLock::acquire(session.lock());
   if (!lock) return lock.error().in("a job works on the session");
   const fs::path root = session.path().parent_path();
-  const fs::path hidden = root / (std::string(kRemoved) + session.id());
-  if (auto renamed = files.rename(session.path(), hidden); !renamed) return renamed;
-  if (auto synced = files.sync_directory(root); !synced) return synced;
-  std::error_code error;
-  fs::remove_all(hidden, error);
-  if (error) log::warning("cannot remove all of {}: {}", hidden.string(), error.message());
-  return ok();
+  fs::path hidden = root / (std::string(kRemoved) + session.id());
+  if (auto renamed = files.rename(session.path(), hidden); !renamed) return renamed.error();
+  if (auto synced = files.sync_directory(root); !synced) return synced.error();
+  return hidden;
 }
 
-void remove_leftovers(const fs::path& root) {
+std::vector<fs::path> leftovers_in(const fs::path& root) {
+  std::vector<fs::path> found;
   std::error_code error;
   for (fs::directory_iterator it(root, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
-    std::error_code ignored;
-    if (name.starts_with(kNew) || name.starts_with(kRemoved)) fs::remove_all(it->path(), ignored);
+    if (name.starts_with(kNew) || name.starts_with(kRemoved)) found.push_back(it->path());
   }
+  return found;
 }
 
 }  // namespace opaline::daemon

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/files.h"
 #include "base/result.h"
@@ -23,11 +24,11 @@ Result<SessionDirectory> make_session(FileOperations& files,
                                       const std::filesystem::path& root,
                                       const SessionDirectory::Contents& contents);
 
-/// Removes a session's directory; from the first moment on it is no session any more. kBusy while a
-/// job works on it.
-Result<void> remove_session(FileOperations& files, const SessionDirectory& session);
+/// Makes a session's directory no session any more, under a hidden name that it returns, to be
+/// removed. kBusy while a job works on it.
+Result<std::filesystem::path> hide_session(FileOperations& files, const SessionDirectory& session);
 
-/// Removes what an interrupted make_session or remove_session left in `root`.
-void remove_leftovers(const std::filesystem::path& root);
+/// What an interrupted make_session left in `root`, and what was hidden and not removed.
+std::vector<std::filesystem::path> leftovers_in(const std::filesystem::path& root);
 
 }  // namespace opaline::daemon

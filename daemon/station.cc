@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "base/log.h"
 #include "daemon/cancel_wish.h"
 #include "daemon/session_factory.h"
@@ -68,7 +70,7 @@ Station::Station(Options options, Rules rules, FileLock lock, std::unique_ptr<Ca
            }}) {}
 
 void Station::take_up_sessions() {
-  remove_leftovers(options_.root);
+  for (fs::path& leftover : leftovers_in(options_.root)) sweeper_.remove(std::move(leftover));
   forget_missing();
   std::error_code error;
   for (fs::directory_iterator it(options_.root, error), end; !error && it != end;
@@ -79,7 +81,7 @@ void Station::take_up_sessions() {
 }
 
 void Station::forget_missing() {
-  const auto entries = catalogue_->list(kListLimit);
+  const auto entries = catalogue_->list(std::numeric_limits<int>::max());
   if (!entries) return;
   for (const CatalogueEntry& entry : *entries) {
     std::error_code none;
@@ -185,7 +187,9 @@ Result<void> Station::remove(const std::string& id) {
   }
   const Result<SessionDirectory> session_directory = directory(id);
   if (!session_directory) return session_directory.error();
-  if (auto removed = remove_session(system_files(), *session_directory); !removed) return removed;
+  Result<fs::path> hidden = hide_session(system_files(), *session_directory);
+  if (!hidden) return hidden.error();
+  sweeper_.remove(*std::move(hidden));
   return catalogue_->remove(id);
 }
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "daemon/executor.h"
 #include "daemon/new_session.h"
 #include "daemon/supervisor.h"
+#include "daemon/sweeper.h"
 
 namespace opaline::daemon {
 
@@ -37,7 +39,12 @@ class Station {
   static Result<std::unique_ptr<Station>> create(const Options& options, Rules rules);
 
   Result<SessionSnapshot> create_session(const NewSession& wish);
+  /// The newest 1000.
   Result<std::vector<CatalogueEntry>> list();
+  /// How many sessions are in each state.
+  Result<std::map<std::string, std::int64_t>> counts() { return catalogue_->counts(); }
+  /// Those that are not over, as they were a moment ago.
+  std::vector<SessionSnapshot> active() const { return supervisor_.snapshots(); }
   Result<SessionSnapshot> session(const std::string& id);
   /// The state of `id` as its supervisor sees it, which also knows of waiting.
   void refine(SessionSnapshot& snapshot) const;
@@ -45,7 +52,7 @@ class Station {
   Result<SessionSnapshot> cancel(const std::string& id);
   /// Tries again what failed or was cancelled. kBusy when there is nothing to resume.
   Result<SessionSnapshot> resume(const std::string& id);
-  /// kBusy unless the session is over.
+  /// kBusy unless the session is over. The session is gone at once, its files soon after.
   Result<void> remove(const std::string& id);
   /// kInvalidArgument for one of a newer version.
   Result<SessionDirectory> directory(const std::string& id) const;
@@ -61,6 +68,7 @@ class Station {
   Rules rules_;
   FileLock lock_;
   std::unique_ptr<Catalogue> catalogue_;
+  Sweeper sweeper_;
   SystemClock clock_;
   LocalExecutor executor_;
   Supervisor supervisor_;  // last: its thread uses all of the above

@@ -17,6 +17,11 @@ Supervisor::Supervisor(SessionSupervisor::Neighbours neighbours,
 void Supervisor::add(SessionDirectory session) {
   const std::filesystem::path lock = hooks_.station_lock(session);
   const std::string id = session.id();
+  {
+    const std::lock_guard guard(snapshots_mutex_);
+    const SessionHistory nothing;
+    snapshots_.try_emplace(id, make_snapshot(session, nothing, decide(nothing, false, false)));
+  }
   const std::lock_guard guard(mutex_);
   const auto [it, is_new] = active_.try_emplace(
       id, Entry{SessionSupervisor(std::move(session), lock, neighbours_, options_.stopping), {}});
@@ -29,6 +34,13 @@ std::optional<SessionSnapshot> Supervisor::snapshot(const std::string& id) const
   const std::lock_guard guard(snapshots_mutex_);
   const auto it = snapshots_.find(id);
   return it == snapshots_.end() ? std::nullopt : std::optional(it->second);
+}
+
+std::vector<SessionSnapshot> Supervisor::snapshots() const {
+  const std::lock_guard guard(snapshots_mutex_);
+  std::vector<SessionSnapshot> all;
+  for (const auto& [id, snapshot] : snapshots_) all.push_back(snapshot);
+  return all;
 }
 
 void Supervisor::run(const std::stop_token& stop) {

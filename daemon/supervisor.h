@@ -37,6 +37,9 @@ class Supervisor {
   void add(SessionDirectory session);
   /// The newest snapshot of a session that is being taken care of.
   std::optional<SessionSnapshot> snapshot(const std::string& id) const;
+  /// The newest of each session that is being taken care of, oldest session first; one that was just
+  /// added is said to be queued.
+  std::vector<SessionSnapshot> snapshots() const;
 
  private:
   struct Entry {

@@ -15,22 +15,16 @@ HttpResponse health() {
   return response;
 }
 
-// Of the sessions that are not over, all that is known; of the others, how many there are.
+// Of the sessions that are not over, all that is known; of all, how many there are. Reads no log.
 HttpResponse status(Station& station) {
-  const auto entries = station.list();
-  if (!entries) return problem(entries.error());
-  nlohmann::json counts = nlohmann::json::object();
+  const auto counts = station.counts();
+  if (!counts) return problem(counts.error());
   nlohmann::json active = nlohmann::json::array();
-  for (const CatalogueEntry& entry : *entries) {
-    counts[entry.state] = counts.value(entry.state, 0) + 1;
-    if (entry.state == "succeeded" || entry.state == "failed" || entry.state == "cancelled")
-      continue;
-    if (const auto snapshot = station.session(entry.id)) active.push_back(to_json(*snapshot));
-  }
+  for (const SessionSnapshot& snapshot : station.active()) active.push_back(to_json(snapshot));
   HttpResponse response;
   response.body = nlohmann::json{{"version", version()},
                                  {"sessions_directory", station.root().string()},
-                                 {"counts", counts},
+                                 {"counts", *counts},
                                  {"active", active}}
                       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
                   "\n";

@@ -90,6 +90,37 @@ TEST_F(Opalined, CancelsOnceAndDeletesOnlyWhatIsOver) {
   EXPECT_EQ(ask("DELETE", "/v1/sessions/" + id).status, 204);
   EXPECT_EQ(ask("GET", "/v1/sessions/" + id).status, 404);
   EXPECT_TRUE(ask("GET", "/v1/sessions").json()["sessions"].empty());
+  EXPECT_TRUE(eventually([&] { return !std::filesystem::exists(sessions_ / (".removed-" + id)); }));
+}
+
+TEST_F(Opalined, RemovesWhatAnInterruptedRemovalLeftAndForgetsWhatIsMissing) {
+  start();
+  const std::string id = create();
+  ASSERT_TRUE(becomes(id, "succeeded"));
+  daemon_->kill(SIGTERM);
+  daemon_->wait();
+  std::filesystem::rename(sessions_ / id, sessions_ / (".removed-" + id));
+
+  start();
+
+  EXPECT_TRUE(ask("GET", "/v1/sessions").json()["sessions"].empty());
+  EXPECT_TRUE(ask("GET", "/v1/status").json()["counts"].empty());
+  EXPECT_TRUE(eventually([&] { return !std::filesystem::exists(sessions_ / (".removed-" + id)); }));
+}
+
+TEST_F(Opalined, CountsEverySessionAndShowsThoseThatAreNotOver) {
+  start();
+  ASSERT_TRUE(becomes(create(), "succeeded"));
+  turn_on("capture.hold");
+  const std::string id = create();
+  EXPECT_EQ(ask("GET", "/v1/status").json()["active"][0]["id"], id);
+  ASSERT_TRUE(becomes(id, "running"));
+
+  EXPECT_TRUE(eventually([&] {
+    const nlohmann::json status = ask("GET", "/v1/status").json();
+    return status["counts"] == nlohmann::json{{"running", 1}, {"succeeded", 1}} &&
+           status["active"].size() == 1 && status["active"][0].contains("progress");
+  }));
 }
 
 TEST_F(Opalined, ResumesWhatFailed) {

@@ -1,6 +1,7 @@
 #include "daemon/catalogue.h"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <fstream>
 
@@ -36,6 +37,32 @@ TEST_F(CatalogueTest, ListsTheNewestFirst) {
   ASSERT_EQ(all->size(), 2U);
   EXPECT_EQ((*all)[0].id, "3");
   EXPECT_EQ((*all)[1].id, "2");
+}
+
+TEST_F(CatalogueTest, CountsTheSessionsOfEachState) {
+  const auto catalogue = *Catalogue::open(file_);
+  for (const char* id : {"a", "b", "c"})
+    ASSERT_TRUE(catalogue->put({id, "n", "/n", "1", "failed"}));
+  ASSERT_TRUE(catalogue->set_state("b", "running"));
+
+  const auto counts = catalogue->counts();
+
+  ASSERT_TRUE(counts);
+  EXPECT_EQ(*counts, (std::map<std::string, std::int64_t>{{"failed", 2}, {"running", 1}}));
+}
+
+TEST_F(CatalogueTest, MakesAFileOfAnotherSchemaAnew) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(::sqlite3_open(file_.c_str(), &database), SQLITE_OK);
+  const char* sql = "CREATE TABLE sessions (key TEXT); PRAGMA user_version = 7";
+  ASSERT_EQ(::sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+  ::sqlite3_close(database);
+
+  const auto catalogue = Catalogue::open(file_);
+
+  ASSERT_TRUE(catalogue);
+  EXPECT_TRUE((*catalogue)->put({"a", "n", "/n", "1", "failed"}));
+  EXPECT_TRUE((*catalogue)->list(10));
 }
 
 TEST_F(CatalogueTest, TakesAnyTextForAValue) {
