@@ -1,69 +1,38 @@
 #include "daemon/http_server.h"
 
 #include <fcntl.h>
-#include <unistd.h>
+#include <fmt/ranges.h>
 
 #include <utility>  // Boost 1.74's awaitable.hpp needs it before
 
-#include <array>
-#include <boost/asio/awaitable.hpp>
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/generic/stream_protocol.hpp>
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
-#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/signal_set.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/asio/write.hpp>
-#include <boost/beast/core/basic_stream.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http.hpp>
 #include <csignal>
 #include <exception>
 
 #include "base/log.h"
 #include "base/unix_socket.h"
 #include "daemon/http_access.h"
+#include "daemon/http_writer.h"
 #include "daemon/problem.h"
 #include "daemon/router.h"
 
 namespace opaline::daemon {
 namespace {
 
-namespace net = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
-using boost::system::error_code;
+using namespace http_detail;  // NOLINT(google-build-using-namespace)
 using Tcp = net::ip::tcp;
 using Local = net::local::stream_protocol;
-using Generic = net::generic::stream_protocol;
-using Stream = beast::basic_stream<Generic>;
 
 constexpr std::uint32_t kHeaderLimit = 8u << 10;
 constexpr std::uint64_t kBodyLimit = 1u << 20;
-constexpr std::size_t kFileChunk = 64u << 10;
-constexpr std::size_t kBusyStream = 32u << 10;
-constexpr std::chrono::milliseconds kStreamPeriod{100};
-constexpr int kPeriodsPerHeartbeat = 50;
-constexpr std::chrono::seconds kLingerDeadline{2};
-constexpr std::size_t kLingerLimit = 4u << 20;
-
-auto into(error_code& error) { return net::redirect_error(net::use_awaitable, error); }
-
-/// Counts while it lives.
-class Counted {
- public:
-  explicit Counted(std::size_t& count) : count_(count) { ++count_; }
-  ~Counted() { --count_; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-
- private:
-  std::size_t& count_;
-};
+constexpr std::size_t kOwnConnections = 8;  // of the Unix socket alone
+constexpr std::chrono::milliseconds kFullPause{20};
 
 // Asio of Boost 1.74 does not: a program that is started elsewhere would keep our port.
 template <class Socket>
@@ -129,18 +98,12 @@ struct HttpServer::Impl {
   net::awaitable<void> serve(Stream stream, bool same_user);
   net::awaitable<bool> serve_one(Stream& stream, beast::flat_buffer& buffer, bool same_user);
   HttpResponse handle(const http::request<http::string_body>& message, bool same_user);
-  net::awaitable<void> write(Stream& stream, HttpResponse& response, bool keep_alive);
-  net::awaitable<void> write_file(Stream& stream, OpenArtefact& file, error_code& error);
-  net::awaitable<void> write_stream(Stream& stream, TextStream& text, error_code& error);
-  net::awaitable<void> write_chunk(Stream& stream, const std::string& text, error_code& error);
-  net::awaitable<void> linger(Stream& stream);
-  template <class Body>
-  void fill_head(http::response<Body>& head, const HttpResponse& response, bool keep_alive) const;
+  HttpResponse call_handler(const HttpRequest& request);
 
   Options options;
   Handler handler;
   std::size_t connections = 0;
-  std::size_t streams = 0;
+  HttpWriter writer{options.write_deadline};
   net::io_context context{1};  // destroys the connections, which count themselves above
   Tcp::acceptor tcp{context};
   Local::acceptor local{context};
@@ -182,8 +145,15 @@ Result<void> HttpServer::Impl::listen_local() {
 
 template <class Acceptor>
 net::awaitable<void> HttpServer::Impl::accept_from(Acceptor& acceptor, bool same_user) {
+  const std::size_t own = std::min(kOwnConnections, options.max_connections / 2);
+  const std::size_t limit = options.max_connections - (same_user ? 0 : own);
+  net::steady_timer full(context);
   for (;;) {
     error_code error;
+    while (connections >= limit) {  // those who come wait in the kernel's queue
+      full.expires_after(kFullPause);
+      co_await full.async_wait(into(error));
+    }
     typename Acceptor::protocol_type::socket socket(context);
     co_await acceptor.async_accept(socket, into(error));
     if (error == net::error::operation_aborted) co_return;
@@ -202,15 +172,10 @@ net::awaitable<void> HttpServer::Impl::accept_from(Acceptor& acceptor, bool same
 net::awaitable<void> HttpServer::Impl::serve(Stream stream, bool same_user) {
   const Counted counted(connections);
   try {
-    if (connections > options.max_connections) {
-      HttpResponse response = problem(503, "busy", "too many connections");
-      co_await write(stream, response, false);
-    } else {
-      beast::flat_buffer buffer;
-      while (co_await serve_one(stream, buffer, same_user)) {
-      }
+    beast::flat_buffer buffer;
+    while (co_await serve_one(stream, buffer, same_user)) {
     }
-    co_await linger(stream);
+    co_await writer.linger(stream);
   } catch (const std::exception& e) {
     log::error("connection: {}", e.what());
   }
@@ -224,13 +189,20 @@ net::awaitable<bool> HttpServer::Impl::serve_one(Stream& stream,
   parser.header_limit(kHeaderLimit);
   parser.body_limit(kBodyLimit);
   error_code error;
-  stream.expires_after(options.read_deadline);
-  co_await http::async_read(stream, buffer, parser, into(error));
+  {
+    const ReadDeadline deadline(stream, options.read_deadline);
+    co_await http::async_read(stream, buffer, parser, into(error));
+    if (error && deadline.has_passed()) error = beast::error::timeout;
+  }
   if (is_gone(error)) co_return false;
   if (error == beast::error::timeout && !parser.got_some()) co_return false;
   HttpResponse response = error ? response_to(error) : handle(parser.get(), same_user);
   const bool keep_alive = !error && parser.get().keep_alive() && response.stream == nullptr;
-  co_await write(stream, response, keep_alive);
+  if (!error && parser.get().method() == http::verb::head) {
+    co_await writer.write_head(stream, response, keep_alive);
+  } else {
+    co_await writer.write(stream, response, keep_alive);
+  }
   co_return keep_alive;
 }
 
@@ -241,118 +213,21 @@ HttpResponse HttpServer::Impl::handle(const http::request<http::string_body>& me
   if (std::optional<HttpResponse> refusal = refuse(*request, options.token)) {
     return *std::move(refusal);
   }
-  HttpResponse response = handler(*request);
-  if (response.stream != nullptr && streams >= options.max_streams) {
+  HttpResponse response = call_handler(*request);
+  if (response.stream != nullptr && writer.streams() >= options.max_streams) {
     return problem(503, "busy", "too many event streams");
   }
   return response;
 }
 
-template <class Body>
-void HttpServer::Impl::fill_head(http::response<Body>& head,
-                                 const HttpResponse& response,
-                                 bool keep_alive) const {
-  head.version(11);
-  head.result(static_cast<unsigned>(response.status));
-  head.keep_alive(keep_alive);
-  head.set(http::field::content_type, response.content_type);
-  head.set(http::field::cache_control, "no-store");
-  head.set("X-Content-Type-Options", "nosniff");
-  for (const auto& [name, value] : response.headers) head.set(name, value);
-}
-
-// Errors of writing end the connection, and are found by the next read.
-net::awaitable<void> HttpServer::Impl::write(Stream& stream,
-                                             HttpResponse& response,
-                                             bool keep_alive) {
-  error_code error;
-  stream.expires_after(options.write_deadline);
-  if (!response.file && response.stream == nullptr) {
-    http::response<http::string_body> message;
-    fill_head(message, response, keep_alive);
-    message.body() = std::move(response.body);
-    message.prepare_payload();
-    co_await http::async_write(stream, message, into(error));
-    co_return;
+// A handler's exception is our fault, and no reason to leave the client without an answer.
+HttpResponse HttpServer::Impl::call_handler(const HttpRequest& request) {
+  try {
+    return handler(request);
+  } catch (const std::exception& e) {
+    log::error("{} /{}: {}", request.method, fmt::join(request.path, "/"), e.what());
+    return problem(500, "internal", "the daemon failed at this request; its log says more");
   }
-  http::response<http::empty_body> head;
-  fill_head(head, response, keep_alive);
-  if (response.file) {
-    head.content_length(response.file->size);
-  } else {
-    head.chunked(true);
-  }
-  http::response_serializer<http::empty_body> serializer(head);
-  co_await http::async_write_header(stream, serializer, into(error));
-  if (!error && response.file) co_await write_file(stream, *response.file, error);
-  if (!error && response.stream != nullptr) co_await write_stream(stream, *response.stream, error);
-  if (error) stream.close();
-}
-
-// Exactly as many bytes as were announced; a file that has shrunk breaks the connection.
-net::awaitable<void> HttpServer::Impl::write_file(Stream& stream,
-                                                  OpenArtefact& file,
-                                                  error_code& error) {
-  std::vector<char> chunk(kFileChunk);
-  std::uint64_t left = file.size;
-  while (left > 0 && !error) {
-    const std::size_t want = static_cast<std::size_t>(std::min<std::uint64_t>(left, chunk.size()));
-    const ssize_t got = ::read(file.file.get(), chunk.data(), want);
-    if (got <= 0) {
-      error = net::error::eof;
-      co_return;
-    }
-    stream.expires_after(options.write_deadline);
-    const net::const_buffer bytes(chunk.data(), static_cast<std::size_t>(got));
-    co_await net::async_write(stream, bytes, into(error));
-    left -= static_cast<std::uint64_t>(got);
-  }
-}
-
-net::awaitable<void> HttpServer::Impl::write_stream(Stream& stream,
-                                                    TextStream& text,
-                                                    error_code& error) {
-  const Counted counted(streams);
-  net::steady_timer timer(context);
-  for (int silent = 0; !error; ++silent) {
-    std::string next = text.next();
-    const bool more = next.size() >= kBusyStream;
-    if (next.empty() && silent >= kPeriodsPerHeartbeat) next = ": still here\n\n";
-    if (!next.empty()) {
-      silent = 0;
-      co_await write_chunk(stream, next, error);
-    }
-    if (text.is_over()) break;
-    if (more) continue;
-    timer.expires_after(kStreamPeriod);
-    co_await timer.async_wait(into(error));
-  }
-  if (error) co_return;
-  stream.expires_after(options.write_deadline);
-  const auto last = http::make_chunk_last();
-  co_await net::async_write(stream, last, into(error));
-}
-
-net::awaitable<void> HttpServer::Impl::write_chunk(Stream& stream,
-                                                   const std::string& text,
-                                                   error_code& error) {
-  stream.expires_after(options.write_deadline);
-  const net::const_buffer bytes(text.data(), text.size());
-  const auto chunk = http::make_chunk(bytes);
-  co_await net::async_write(stream, chunk, into(error));
-}
-
-// What the peer still sends is read and dropped, so that it gets to read our answer.
-net::awaitable<void> HttpServer::Impl::linger(Stream& stream) {
-  error_code error;
-  stream.socket().shutdown(Generic::socket::shutdown_send, error);
-  std::vector<char> dropped(kFileChunk);
-  stream.expires_after(kLingerDeadline);
-  for (std::size_t total = 0; !error && total < kLingerLimit;) {
-    const net::mutable_buffer space(dropped.data(), dropped.size());
-    total += co_await stream.async_read_some(space, into(error));
-  }
-  stream.close();
 }
 
 Result<std::unique_ptr<HttpServer>> HttpServer::listen(const Options& options, Handler handler) {

@@ -19,8 +19,9 @@ namespace opaline::daemon {
 /// Who may ask: everyone who can open the Unix socket, that is this user. Over TCP on a loopback
 /// address every local user, but no web page of another site (Host and Origin are checked); with a
 /// token, whoever sends "Authorization: Bearer TOKEN".
-/// Everything is bounded: header 8 KiB, body 1 MiB, connections, streams, and the time for each
-/// read and write. What is not HTTP is answered 400, 408, 413 or 431 and closed.
+/// Everything is bounded: header 8 KiB, body 1 MiB, connections (over TCP eight fewer, so that this
+/// user's socket always answers; who is one too many waits to be accepted), streams (503), and the
+/// time for each read and write. What is not HTTP is answered 400, 408, 413 or 431 and closed.
 class HttpServer {
  public:
   struct Options {
@@ -33,7 +34,7 @@ class HttpServer {
     std::chrono::seconds read_deadline{30};   ///< for a request, from when it could begin
     std::chrono::seconds write_deadline{30};  ///< for each piece of a response
   };
-  /// Called on run()'s thread.
+  /// Called on run()'s thread; what it throws is answered 500.
   using Handler = std::function<HttpResponse(const HttpRequest&)>;
 
   /// Errors: kInvalidArgument for a bad address or a missing token, kBusy when another server is

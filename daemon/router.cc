@@ -70,8 +70,9 @@ HttpResponse Router::handle(const HttpRequest& request) const {
   for (const Route& route : routes_) {
     const std::optional<Parameters> parameters = match(route.pattern, request.path);
     if (!parameters) continue;
-    if (route.method == request.method) return route.handler(request, *parameters);
-    allowed.push_back(route.method);
+    const bool is_head = route.method == "GET" && request.method == "HEAD";
+    if (is_head || route.method == request.method) return route.handler(request, *parameters);
+    allowed.push_back(route.method == "GET" ? "GET, HEAD" : route.method);
   }
   if (allowed.empty()) return problem(404, "not_found", "there is no such resource");
   const std::string list = fmt::format("{}", fmt::join(allowed, ", "));

@@ -18,7 +18,7 @@ class Router {
 
   /// `pattern`: "/v1/sessions/{id}/artefacts/{name...}"; the dots take the rest of the path.
   void add(std::string method, std::string_view pattern, Handler handler);
-  /// The handler's response; 404 for an unknown path, 405 with Allow for another method.
+  /// The handler's response, for HEAD that of GET; 404 for an unknown path, 405 with Allow for another method.
   HttpResponse handle(const HttpRequest& request) const;
 
  private:
