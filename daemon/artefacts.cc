@@ -38,24 +38,39 @@ Error no_such(std::string_view name) {
   return not_found(fmt::format("the session has no artefact \"{}\"", name));
 }
 
+bool is_missing(const std::error_code& error) {
+  return error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
+}
+
+// Files and directories may go while we look: a job works here.
+Result<void> collect(const fs::path& root,
+                     const fs::path& below,
+                     std::size_t limit,
+                     std::vector<Artefact>& found) {
+  std::error_code error;
+  const fs::directory_iterator end;
+  for (fs::directory_iterator it(root / below, error); !error && it != end; it.increment(error)) {
+    if (found.size() >= limit) return ok();
+    const fs::path name = it->path().filename();
+    if (!is_plain(name.string())) continue;
+    std::error_code gone;
+    const fs::file_type type = it->symlink_status(gone).type();
+    if (type == fs::file_type::directory) {
+      if (auto inner = collect(root, below / name, limit, found); !inner) return inner;
+    } else if (type == fs::file_type::regular) {
+      const std::uint64_t size = it->file_size(gone);
+      if (!gone) found.push_back({(below / name).string(), size});
+    }
+  }
+  if (!error || is_missing(error)) return ok();
+  return unavailable(fmt::format("{}: {}", (root / below).string(), error.message()));
+}
+
 }  // namespace
 
 Result<std::vector<Artefact>> list_artefacts(const SessionDirectory& session, std::size_t limit) {
   std::vector<Artefact> found;
-  std::error_code error;
-  const auto none = fs::recursive_directory_iterator();
-  for (fs::recursive_directory_iterator it(session.path(), error); !error && it != none;
-       it.increment(error)) {
-    std::error_code gone;  // a file may go while we look
-    if (!is_plain(it->path().filename().string())) {
-      it.disable_recursion_pending();
-    } else if (it->symlink_status(gone).type() == fs::file_type::regular) {
-      const std::uint64_t size = it->file_size(gone);
-      if (!gone) found.push_back({it->path().lexically_relative(session.path()).string(), size});
-    }
-    if (found.size() >= limit) break;
-  }
-  if (error) return unavailable(fmt::format("{}: {}", session.path().string(), error.message()));
+  if (auto listed = collect(session.path(), {}, limit, found); !listed) return listed.error();
   std::ranges::sort(found, {}, &Artefact::name);
   return found;
 }
