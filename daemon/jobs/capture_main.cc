@@ -1,3 +1,5 @@
+#include <stop_token>
+
 #include "base/log.h"
 #include "capture/sequence.h"
 #include "config/session_config.h"
@@ -26,11 +28,18 @@ Result<void> capture(daemon::JobContext& context) {
   if (!program) return program.error();
   const auto guardian = daemon::Guardian::start(*program, directory, context.stop);
   if (!guardian) return guardian.error();
+  std::stop_source stop;
+  const auto request = [&stop] { stop.request_stop(); };
+  const std::stop_callback asked(context.stop, request);
+  const std::stop_callback unguarded((*guardian)->death(), request);
   const auto summary =
       opaline::capture::capture_session({config->capture, config->sample, config->rig.calibration},
                                         (*devices)->station(),
                                         {directory, context.files, context.events},
-                                        context.stop);
+                                        stop.get_token());
+  if (!summary && (*guardian)->death().stop_requested()) {
+    return opaline::unavailable("the guardian died, and without one no light stays on");
+  }
   if (!summary) return summary.error();
   opaline::log::info("capture: {} lights, {} taken now, {} times taken again, {} unusable",
                      summary->lights,

@@ -119,7 +119,12 @@ Result<FileLock> acquire_patiently(const std::filesystem::path& path) {
 }  // namespace
 
 Guardian::Guardian(pid_t pid, FileDescriptor process, FileDescriptor hold)
-    : pid_(pid), process_(std::move(process)), hold_(std::move(hold)) {}
+    : pid_(pid),
+      process_(std::move(process)),
+      hold_(std::move(hold)),
+      watcher_([this](const std::stop_token& stop) {
+        if (wait_readable(process_.get(), Time::time_point::max(), stop)) death_.request_stop();
+      }) {}
 
 Result<std::unique_ptr<Guardian>> Guardian::start(const std::filesystem::path& program,
                                                   const std::filesystem::path& session,
@@ -145,6 +150,8 @@ Result<std::unique_ptr<Guardian>> Guardian::start(const std::filesystem::path& p
 }
 
 Guardian::~Guardian() {
+  watcher_.request_stop();
+  watcher_.join();
   hold_.reset();
   if (auto ended = wait_readable(process_.get(), Time::now() + kEndPatience, {}); !ended) {
     log::warning("guardian, process {}: {}", pid_, ended.error().message);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <stop_token>
+#include <thread>
 
 #include "base/file_descriptor.h"
 #include "base/result.h"
@@ -34,12 +35,16 @@ class Guardian {
   Guardian& operator=(const Guardian&) = delete;
 
   pid_t pid() const { return pid_; }
+  /// Stop is requested when the guardian dies before it was let go: the light has nobody to watch it.
+  std::stop_token death() const { return death_.get_token(); }
 
  private:
   Guardian(pid_t pid, FileDescriptor process, FileDescriptor hold);
   pid_t pid_;
   FileDescriptor process_;  // a pidfd
   FileDescriptor hold_;     // closing it ends the guardian
+  std::stop_source death_;
+  std::jthread watcher_;
 };
 
 /// The guardian's side: takes the lock, says "ready" on standard output, waits until standard input ends, and makes
