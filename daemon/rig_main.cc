@@ -124,9 +124,7 @@ Result<void> print_truth(const Arguments& arguments) {
 
 Result<void> add_fault(const Arguments& arguments) {
   sim::RigClient client(arguments.socket);
-  const auto status = client.status();
-  if (!status) return status.error();
-  sim::Faults faults = arguments.clear ? sim::Faults{} : status->faults;
+  sim::Faults faults;
   if (!arguments.fault.empty()) {
     const auto kind = sim::fault_from_name(arguments.fault);
     if (!kind) return kind.error();
@@ -134,7 +132,7 @@ Result<void> add_fault(const Arguments& arguments) {
     fault.kind = *kind;
     faults.push_back(fault);
   }
-  return client.arm(faults);
+  return arguments.clear ? client.arm(faults) : client.add(faults);
 }
 
 std::string fault_list() {

@@ -56,6 +56,7 @@ Result<FaultKind> fault_from_name(std::string_view name);
 class FaultPlan {
  public:
   void arm(Faults faults) { faults_ = std::move(faults); }
+  void add(const Faults& faults) { faults_.insert(faults_.end(), faults.begin(), faults.end()); }
   /// Whether a fault of this kind strikes this event; uses it up.
   bool strikes(FaultKind kind, std::uint64_t pattern);
   /// The same, but uses the whole of it up and returns its count; 0 = none strikes.

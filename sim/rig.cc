@@ -405,4 +405,10 @@ Result<void> Rig::arm(const Faults& faults) {
   return ok();
 }
 
+Result<void> Rig::add(const Faults& faults) {
+  const std::lock_guard lock(mutex_);
+  plan_.add(faults);
+  return ok();
+}
+
 }  // namespace opaline::sim

@@ -55,6 +55,7 @@ class Rig : public RigPort {
   Result<RigStatus> status() override;
   Result<RigTruth> truth() override;
   Result<void> arm(const Faults& faults) override;
+  Result<void> add(const Faults& faults) override;
 
  private:
   Rig(const RigOptions& options, std::shared_ptr<const TransportResponses> responses, Clock* clock);

@@ -114,4 +114,10 @@ Result<void> RigClient::arm(const Faults& faults) {
   return ok();
 }
 
+Result<void> RigClient::add(const Faults& faults) {
+  const auto reply = ask("add_faults", encode(faults));
+  if (!reply) return reply.error();
+  return ok();
+}
+
 }  // namespace opaline::sim

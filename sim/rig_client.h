@@ -29,6 +29,7 @@ class RigClient : public RigPort {
   Result<RigStatus> status() override;
   Result<RigTruth> truth() override;
   Result<void> arm(const Faults& faults) override;
+  Result<void> add(const Faults& faults) override;
   /// Asks the rig to darken its lamp and end; it does so within a second.
   Result<void> end();
 

@@ -45,8 +45,7 @@ struct RigTruth {
 ///
 /// Threads: thread-safe.
 /// Waits:   expose() as drivers::Camera says, on the rig's clock; all others 2 s at most.
-/// Errors:  kUnavailable when the device is lost, closed or since opened by somebody else, or the
-/// rig is not there;
+/// Errors:  kUnavailable when the device is lost, closed or since opened by somebody else, or the rig is not there;
 ///          kBusy for an exposure during another.
 class RigPort {
  public:
@@ -78,6 +77,8 @@ class RigPort {
   virtual Result<RigTruth> truth() = 0;
   /// Replaces the faults to come.
   virtual Result<void> arm(const Faults& faults) = 0;
+  /// Adds to them.
+  virtual Result<void> add(const Faults& faults) = 0;
 };
 
 }  // namespace opaline::sim

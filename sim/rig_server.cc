@@ -59,9 +59,10 @@ RigMessage show(RigPort& rig,
   return pattern ? reply_to(rig.show(session, *pattern, stop)) : encode(pattern.error());
 }
 
-RigMessage arm(RigPort& rig, const RigMessage& request) {
+RigMessage arm(RigPort& rig, const RigMessage& request, bool anew) {
   const auto faults = decode_faults(request);
-  return faults ? reply_to(rig.arm(*faults)) : encode(faults.error());
+  if (!faults) return encode(faults.error());
+  return reply_to(anew ? rig.arm(*faults) : rig.add(*faults));
 }
 
 /// Does what a request asks for.
@@ -82,7 +83,8 @@ RigMessage perform(RigPort& rig, const RigMessage& request, const std::stop_toke
   if (what == "dark") return reply_to(rig.dark(session));
   if (what == "status") return reply_to(rig.status());
   if (what == "truth") return reply_to(rig.truth());
-  if (what == "arm") return arm(rig, request);
+  if (what == "arm") return arm(rig, request, true);
+  if (what == "add_faults") return arm(rig, request, false);
   return encode(invalid_argument(fmt::format("no request \"{}\"", what)));
 }
 

@@ -9,6 +9,8 @@
 #include <numeric>
 #include <thread>
 
+#include "sim/light_transport.h"
+#include "sim/scene.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_projector.h"
 #include "tests/support/simulated_station.h"
@@ -241,6 +243,65 @@ TEST_F(RigTest, ResponsesThatDoNotFitAreRefused) {
   EXPECT_THAT(elsewhere.error().message, ::testing::HasSubstr("5.0 mm away"));
 }
 
+TEST_F(RigTest, ALitPatchIsSeenWhereItIsFromBehindAndFromInFront) {
+  const Block block = support::tiny_responses()->block;
+  const auto material =
+      make_material({.kind = SceneKind::kHomogeneous, .block = block, .reduced_scattering = 2.0});
+  ASSERT_TRUE(material) << material.error().message;
+  for (const Face lit : {Face::kZMin, Face::kZMax}) {
+    NullSink nobody;
+    const auto computed = compute_responses(*material,
+                                            {.lit_face = lit,
+                                             .patches_x = 2,
+                                             .patches_y = 2,
+                                             .camera_centre = {4.0, 4.0, 104.0},
+                                             .photons_per_patch = 1},
+                                            "",
+                                            nobody,
+                                            {});
+    ASSERT_TRUE(computed);
+    auto made =
+        Rig::create(options_, std::make_shared<const TransportResponses>(*computed), &clock_);
+    ASSERT_TRUE(made) << made.error().message;
+    SimCamera camera(**made);
+    SimProjector projector(**made);
+    ASSERT_TRUE(camera.open());
+    ASSERT_TRUE(projector.open());
+    // The face is 40 pixels wide from (20, 10) on; its right half, of the upper rows, is patch (1, 0).
+    drivers::Pattern pattern = support::flat_pattern(options_, 1, 0);
+    for (int y = 10; y < 30; ++y) {
+      for (int x = 40; x < 60; ++x) {
+        for (int c = 0; c < 3; ++c) pattern.codes.at(x, y, c) = 255;
+      }
+    }
+    ASSERT_TRUE(projector.show(pattern, {}));
+    clock_.sleep(options_.projector.latency, {});
+    const auto truth = (*made)->truth();
+    ASSERT_TRUE(truth);
+    EXPECT_GT(truth->patch_irradiance[1][0], 50.0 * truth->patch_irradiance[0][0]);
+    EXPECT_GT(truth->patch_irradiance[1][0], 50.0 * truth->patch_irradiance[2][0]);
+    const auto frame = camera.capture({kTurn, 1}, {});
+    ASSERT_TRUE(frame);
+    const auto code_at = [&](double x, double y) {
+      const auto pixel = options_.camera.model.project({x, y, block.size().z});
+      double sum = 0.0;
+      for (int dy = -3; dy < 3; ++dy) {
+        for (int dx = -3; dx < 3; ++dx) {
+          sum +=
+              frame->pixels.at(static_cast<int>(pixel.x) + dx, static_cast<int>(pixel.y) + dy, 0) -
+              64.0;
+        }
+      }
+      return sum / 36.0;
+    };
+    const double lit_patch = code_at(6.0, 2.0);
+    const double beside = std::max({code_at(2.0, 2.0), code_at(6.0, 6.0), code_at(2.0, 6.0)});
+    // From behind, 4 mm of scattering blur a patch of 4 mm; from in front little of the light gets to the next one.
+    EXPECT_GT(lit_patch, (lit == Face::kZMin ? 1.5 : 5.0) * beside) << to_string(lit);
+    EXPECT_GT(lit_patch, 20.0);
+  }
+}
+
 class RigFaultTest : public RigTest {
  protected:
   void arm(FaultKind kind, int count = 1, int skip = 0) {
@@ -319,6 +380,16 @@ TEST_F(RigFaultTest, FaultsWaitForTheirTurnAndEnd) {
   EXPECT_FALSE(intact());
   EXPECT_FALSE(intact());
   EXPECT_TRUE(intact());
+}
+
+TEST_F(RigFaultTest, FaultsAddedAtTheSameTimeAllCome) {
+  const auto add_fifty = [&] {
+    for (int i = 0; i < 50; ++i) EXPECT_TRUE(rig_->add({{.kind = FaultKind::kTornFrame}}));
+  };
+  std::jthread other(add_fifty);
+  add_fifty();
+  other.join();
+  EXPECT_EQ(rig_->status()->faults.size(), 100u);
 }
 
 TEST_F(RigFaultTest, AFaultMayWaitForAPattern) {
