@@ -20,7 +20,10 @@ class DeviceBench {
   virtual bool can_unplug_projector() const { return true; }
   virtual void unplug_projector() {}
   virtual void plug() = 0;
-  /// Whether an exposure takes as long as asked for, in real time.
+  /// The next exposure's frame never comes.
+  virtual void lose_frame() {}
+  /// Whether an exposure takes as long as asked for, in real time; then its frame can be lost, and so can its camera
+  /// while it lasts.
   virtual bool keeps_time() const { return true; }
 };
 

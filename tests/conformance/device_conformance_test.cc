@@ -199,6 +199,72 @@ TEST_P(DeviceConformance, AnExposureTakesAsLongAsAskedForAndNotMuchLonger) {
   EXPECT_LE(took, kShort * 3 / 2 + 2s);  // the deadline
 }
 
+TEST_P(DeviceConformance, AFrameThatNeverComesIsATimeout) {
+  if (!bench_->keeps_time()) GTEST_SKIP() << "a frame comes at once or not at all";
+  open();
+  show(1);
+  bench_->lose_frame();
+  const auto start = steady_clock::now();
+  EXPECT_EQ(code(take(1)), ErrorCode::kTimeout);
+  const auto took = steady_clock::now() - start;
+  EXPECT_GE(took, kShort);
+  EXPECT_LE(took, kShort * 3 / 2 + 2s + 2s);  // the deadline, and a busy machine
+  EXPECT_TRUE(take(1));                       // and it still works
+}
+
+TEST_P(DeviceConformance, ACameraLostWhileItExposesIsUnavailable) {
+  if (!bench_->keeps_time()) GTEST_SKIP() << "an exposure is over at once";
+  open();
+  show(1);
+  bench_->unplug_camera();
+  const auto start = steady_clock::now();
+  EXPECT_EQ(code(take(1, 400ms)), ErrorCode::kUnavailable);
+  EXPECT_GE(steady_clock::now() - start, 190ms);  // half of it
+  EXPECT_EQ(bench_->camera().info().error().code, ErrorCode::kUnavailable);
+  bench_->plug();
+  ASSERT_TRUE(bench_->camera().open());
+  EXPECT_TRUE(take(1));
+}
+
+TEST_P(DeviceConformance, ShowReturnsWithin100MillisecondsOfAStopRequest) {
+  open();
+  auto quickest = 10'000ms;
+  for (std::uint64_t attempt = 1; attempt <= 3 && quickest > 100ms; ++attempt) {  // a busy machine
+    std::stop_source stop;
+    steady_clock::time_point asked;
+    std::jthread asking([&] {
+      std::this_thread::sleep_for(1ms);
+      asked = steady_clock::now();
+      stop.request_stop();
+    });
+    const auto shown = bench_->projector().show(pattern(attempt), stop.get_token());
+    const auto returned = steady_clock::now();
+    asking.join();
+    EXPECT_TRUE(shown || shown.error().code == ErrorCode::kCancelled);
+    quickest = std::min(quickest, std::chrono::ceil<std::chrono::milliseconds>(returned - asked));
+  }
+  EXPECT_LE(quickest, 100ms);
+  EXPECT_TRUE(bench_->projector().show(pattern(9), {}));  // and it still works
+}
+
+TEST_P(DeviceConformance, DarkComesFromAnyThreadWhileTheCameraExposes) {
+  open();
+  show(1);
+  Result<void> darkened = ok();
+  std::jthread darkening([&] {
+    std::this_thread::sleep_for(20ms);
+    darkened = bench_->projector().dark();
+  });
+  EXPECT_TRUE(take(1, kShort));
+  darkening.join();
+  EXPECT_TRUE(darkened);
+  const auto frame = take(0);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->pattern_id, 0u);
+  show(2);  // its own projector's dark does not end the session
+  EXPECT_TRUE(take(2));
+}
+
 TEST_P(DeviceConformance, ALostCameraIsUnavailableUntilItIsBack) {
   open();
   show(1);

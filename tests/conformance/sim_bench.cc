@@ -25,13 +25,14 @@ class SimBench : public DeviceBench {
   drivers::Projector& projector() override { return projector_; }
   void unplug_camera() override { arm(sim::FaultKind::kCameraLost); }
   void unplug_projector() override { arm(sim::FaultKind::kProjectorLost); }
+  void lose_frame() override { arm(sim::FaultKind::kMissingFrame, 1); }
   void plug() override {
     if (auto armed = rig_->arm({}); !armed) std::abort();
   }
 
  private:
-  void arm(sim::FaultKind kind) {
-    if (auto armed = rig_->arm({{.kind = kind, .count = 1000}}); !armed) std::abort();
+  void arm(sim::FaultKind kind, int count = 1000) {
+    if (auto armed = rig_->arm({{.kind = kind, .count = count}}); !armed) std::abort();
   }
   std::unique_ptr<sim::Rig> rig_ = *sim::Rig::create(real_time(), support::tiny_responses());
   sim::SimCamera camera_{*rig_};
@@ -44,13 +45,14 @@ class SocketBench : public DeviceBench {
   drivers::Projector& projector() override { return projector_; }
   void unplug_camera() override { arm(sim::FaultKind::kCameraLost); }
   void unplug_projector() override { arm(sim::FaultKind::kProjectorLost); }
+  void lose_frame() override { arm(sim::FaultKind::kMissingFrame, 1); }
   void plug() override {
     if (auto armed = client_.arm({}); !armed) std::abort();
   }
 
  private:
-  void arm(sim::FaultKind kind) {
-    if (auto armed = client_.arm({{.kind = kind, .count = 1000}}); !armed) std::abort();
+  void arm(sim::FaultKind kind, int count = 1000) {
+    if (auto armed = client_.arm({{.kind = kind, .count = count}}); !armed) std::abort();
   }
   testing::TemporaryDirectory directory_;
   std::unique_ptr<sim::Rig> rig_ = *sim::Rig::create(real_time(), support::tiny_responses());
