@@ -33,13 +33,11 @@ struct ExposureRequest {
 ///        ^                 |                    |
 ///        +----close()------+         device lost: closed, kUnavailable
 ///
-/// Threads: one caller at a time; close() may come from any thread and ends a capture with
-/// kCancelled. Waits:   open() at most 5 s; capture() at most 1.5 times the exposure plus 2 s, then
-/// kTimeout;
+/// Threads: one caller at a time; close() may come from any thread and ends a capture with kCancelled.
+/// Waits:   open() at most 5 s; capture() at most 1.5 times the exposure plus 2 s, then kTimeout;
 ///          a stop request ends it with kCancelled within 100 ms.
-/// Errors:  kInvalidArgument for an exposure out of range; kUnavailable while closed or when the
-/// device is lost
-///          (open() again once it is back); kNotFound where no such device exists.
+/// Errors:  kInvalidArgument for an exposure out of range; kUnavailable while closed, or when the device is lost or
+///          taken by somebody else (open() again once it is back); kNotFound where no such device exists.
 class Camera {
  public:
   virtual ~Camera() = default;

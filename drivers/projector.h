@@ -35,10 +35,12 @@ struct Pattern {
 ///        +----close()-----+-+----dark()------+         device lost: closed, kUnavailable
 ///
 /// open() and close() leave the lamp dark. show() returns once the pattern is *commanded*; light
-/// follows within the latency, so a caller settles before it exposes. Threads: one caller at a
-/// time; dark() may come from any thread. Waits:   every call at most 2 s, then kTimeout; a stop
-/// request ends it with kCancelled within 100 ms. Errors:  kInvalidArgument for a pattern of the
-/// wrong size or id 0; kUnavailable while closed or when lost.
+/// follows within the latency, so a caller settles before it exposes.
+///
+/// Threads: one caller at a time; dark() may come from any thread, and a show() that it overtakes lights nothing.
+/// Waits:   every call at most 2 s, then kTimeout; a stop request ends it with kCancelled within 100 ms.
+/// Errors:  kInvalidArgument for a pattern of the wrong size or id 0; kUnavailable while closed, when lost, or when made
+///          dark by somebody else; kCancelled for a show() that dark() overtook.
 class Projector {
  public:
   virtual ~Projector() = default;

@@ -96,11 +96,9 @@ struct TransportTally {
 /// on the way. Far collisions are thinned by an unbiased roulette. Light that never scattered is
 /// not part of it.
 ///
-/// Threads: the work is cut into parts that do not depend on the number of threads, each with
-/// random numbers of its own,
+/// Threads: the work is cut into parts that do not depend on the number of threads, each with random numbers of its own,
 ///          and summed in their order: results are equal to the bit for any number of threads.
-/// Errors:  kInvalidArgument (sizes, ranges, an almost clear block), kCancelled soon after a stop
-/// request.
+/// Errors:  kInvalidArgument (sizes, ranges, an almost clear block), kCancelled soon after a stop request.
 Result<TransportTally> trace(const Block& block,
                              double ior,
                              const ChannelCoefficients& coefficients,

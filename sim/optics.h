@@ -23,10 +23,10 @@ CameraModel demo_camera_model();
 /// after the PSF), with r the distance from the middle of the picture in units of half its
 /// diagonal,
 ///
-///   mean electrons = sensitivity L t (1 + v0 r^2 + v1 r^4 + v2 r^6) + dark t      t the measured
-///   exposure electrons      = min(Poisson(mean), full_well) + Normal(0, read_noise) x = electrons
-///   / (gain (max_code - black_level)),  max_code = 2^bit_depth - 1 code           =
-///   round(black_level + (max_code - black_level) sign(x) |x|^(1/response_gamma)), 0 to max_code
+///   mean electrons = sensitivity L t (1 + v0 r^2 + v1 r^4 + v2 r^6) + dark t      (t: the measured exposure)
+///   electrons      = min(Poisson(mean), full_well) + Normal(0, read_noise)
+///   x              = electrons / (gain (max_code - black_level)),  max_code = 2^bit_depth - 1
+///   code           = round(black_level + (max_code - black_level) sign(x) |x|^(1/response_gamma)), 0 to max_code
 ///
 /// Noise is drawn from a key of seed, pattern and exposure: the same request gives the same pixels,
 /// whenever and however often it is made.
@@ -55,8 +55,7 @@ Result<void> validate(const CameraOptics& options);
 
 /// What the simulated projector does with a picture: its light falls perpendicular on the lit face,
 ///
-///   irradiance = peak (1 + v0 r^2 + v1 r^4 + v2 r^6) (black_level + (1 - black_level)
-///   (code/255)^gamma)
+///   irradiance = peak (1 + v0 r^2 + v1 r^4 + v2 r^6) (black_level + (1 - black_level) (code/255)^gamma)
 ///
 /// at (column mm, row mm) = (x - offset_x_px, y - offset_y_px) mm_per_pixel of that face's raster
 /// (see Block). A colour wheel lights one channel after the other, each for a third of a turn at
