@@ -1,6 +1,7 @@
 // Holds the layer table of docs/architecture.md: reads every #include of the project's own files, and which library uses
 // which in the CMakeLists.txt beside them.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -150,7 +151,7 @@ std::vector<std::string> wrong_layers(const std::vector<Include>& includes) {
     const std::string from = layer_of(include.file);
     const std::string to = layer_of(include.header);
     if (from.empty() || to.empty() || !include.ours || may_see(from, to)) continue;
-    wrong.push_back(at(include) + ": " + from + " may not see " + to);
+    wrong.push_back(fmt::format("{}: {} may not see {}", at(include), from, to));
   }
   return wrong;
 }
@@ -192,7 +193,7 @@ Target parse_target(const std::string& arguments, const std::string& directory) 
     } else if (list == "USES") {
       target.uses.push_back(word);
     } else if (list == "SOURCES" && target.layer.empty()) {
-      target.layer = layer_of(directory + "/" + word);
+      target.layer = layer_of(fmt::format("{}/{}", directory, word));
     }
   }
   if (target.layer.empty()) target.layer = layer_of(directory + "/");
@@ -227,10 +228,10 @@ std::vector<std::string> wrong_uses(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     for (const std::string& used : target.uses) {
       if (!layers.contains(used)) {
-        wrong.push_back(target.name + " uses " + used + ", which no directory has");
+        wrong.push_back(fmt::format("{} uses {}, which no directory has", target.name, used));
       } else if (!may_see(target.layer, layers[used])) {
-        wrong.push_back(target.name + " of " + target.layer + " uses " + used + " of " +
-                        layers[used]);
+        wrong.push_back(
+            fmt::format("{} of {} uses {} of {}", target.name, target.layer, used, layers[used]));
       }
     }
   }

@@ -93,7 +93,7 @@ class SessionReport {
   Result<void> compare_with_transport();
   Result<void> read_facts();
   Result<void> write_pictures(const RelitLight& light);
-  Result<void> write_image(const std::string& name, ImageFile image, ImageFormat format);
+  Result<void> write_image(const std::string& name, const ImageFile& image, ImageFormat format);
   Result<void> write_report();
   StepProgress step(const char* name) { return {job_.events, clock_, name}; }
 
@@ -211,7 +211,7 @@ Result<void> SessionReport::compare_with_transport() {
 }
 
 Result<void> SessionReport::write_image(const std::string& name,
-                                        ImageFile image,
+                                        const ImageFile& image,
                                         ImageFormat format) {
   const auto bytes = encode_image(image, format);
   if (!bytes) return bytes.error().in(name);
@@ -221,11 +221,11 @@ Result<void> SessionReport::write_image(const std::string& name,
 Result<void> SessionReport::write_pictures(const RelitLight& light) {
   const double range = data_.difference * data_.white;
   struct Output {
-    const char* ending;
+    const char* ending = "";
     ImageFile image;
-    ImageFormat format;
+    ImageFormat format = ImageFormat::kPng;
   };
-  std::array outputs{
+  const std::array outputs{
       Output{"captured.png", {tone_mapped(light.captured, data_.white), {}, {}}, ImageFormat::kPng},
       Output{"relit.png", {tone_mapped(light.relit, data_.white), {}, {}}, ImageFormat::kPng},
       Output{"difference.png",
@@ -233,9 +233,9 @@ Result<void> SessionReport::write_pictures(const RelitLight& light) {
              ImageFormat::kPng},
       Output{"captured.exr", {light.captured, {}, {{"unit", "W/(mm^2 sr)"}}}, ImageFormat::kExr},
       Output{"relit.exr", {light.relit, {}, {{"unit", "W/(mm^2 sr)"}}}, ImageFormat::kExr}};
-  for (Output& output : outputs) {
+  for (const Output& output : outputs) {
     const std::string name = fmt::format("{}-{}", light.name, output.ending);
-    if (auto written = write_image(name, std::move(output.image), output.format); !written) {
+    if (auto written = write_image(name, output.image, output.format); !written) {
       return written;
     }
   }

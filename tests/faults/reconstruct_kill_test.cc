@@ -22,11 +22,12 @@ TEST(KilledReconstruction, FindsTheVeryMaterialOfAnUndisturbedOne) {
   const auto captured = (*bed)->complete("opaline-capture", *reference);
   ASSERT_TRUE(captured) << captured.error().message;
   const auto copy_of_capture = [&](const std::string& name) {
-    const auto session = (*bed)->root() / name;
+    auto session = (*bed)->root() / name;
     std::filesystem::copy(*reference, session, std::filesystem::copy_options::recursive);
     return session;
   };
   std::vector<std::filesystem::path> sessions;
+  sessions.reserve(kKills);
   for (int i = 0; i < kKills; ++i)
     sessions.push_back(copy_of_capture("killed-" + std::to_string(i)));
   const auto start = std::chrono::steady_clock::now();

@@ -12,6 +12,7 @@
 #include "base/io/image_io.h"
 #include "base/io/transport_io.h"
 #include "daemon/report/html.h"
+#include "daemon/report/step_progress.h"
 #include "daemon/report/surface_radiance.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/translucency.h"
@@ -292,6 +293,17 @@ TEST_F(SessionReportTest, LeavesNotesWhereGnuplotIsMissing) {
   EXPECT_THAT(page_, HasSubstr("14 of 14 plots could not be drawn"));
   EXPECT_THAT(page_, HasSubstr("apt install gnuplot-nox"));
   EXPECT_THAT(section("convergence"), HasSubstr("Not drawn: Misfit"));
+}
+
+TEST(StepProgress, ExpectsTheRestToGoAsFastAsWhatIsDone) {
+  ProgressSink heard;
+  ManualClock clock;
+  StepProgress progress(heard, clock, "lighting");
+  clock.advance(std::chrono::seconds(6));
+  progress.done(0.25);
+  ASSERT_EQ(heard.steps["lighting"].size(), 2U);
+  EXPECT_FALSE(heard.steps["lighting"][0].seconds_left);
+  EXPECT_DOUBLE_EQ(heard.steps["lighting"][1].seconds_left.value(), 18.0);
 }
 
 TEST_F(SessionReportTest, TellsHowFarEachStepIs) {
