@@ -127,35 +127,43 @@ FrameLight measure_light(const CameraCalibration& camera,
   std::vector<double> snrs;
   double sum = 0.0;
   double variance = 0.0;
-  std::size_t pixels = 0;
   std::size_t saturated = 0;
+  std::size_t telling = 0;
+  std::size_t clipped = 0;
   for (int y = 0; y < footprint.height(); ++y) {
     for (int x = 0; x < footprint.width(); ++x) {
       if (footprint.at(x, y) == 0) continue;
       for (int c = 0; c < 3; ++c) {
         const int code = pair.light->at(x, y, c);
-        ++pixels;
-        if (range_share(camera, clipping, code) >= kNoWeight) ++saturated;
+        const int black_code = pair.black->at(x, y, c);
+        const bool full = range_share(camera, clipping, code) >= kNoWeight;
+        if (full) ++saturated;
         const Electrons light = electrons_from_code(camera, code);
-        const Electrons black = electrons_from_code(camera, pair.black->at(x, y, c));
+        const Electrons black = electrons_from_code(camera, black_code);
         const double net = light.signal - black.signal * scale;
         const double noise = noise_variance(camera, light.signal, light.per_code) +
                              scale * scale * noise_variance(camera, black.signal, black.per_code);
+        snrs.push_back(net / std::sqrt(noise));
+        if (range_share(camera, clipping, black_code) >= kNoWeight) continue;
+        ++telling;
+        if (full) ++clipped;
         sum += net;
         variance += noise;
-        snrs.push_back(net / std::sqrt(noise));
       }
     }
   }
   FrameLight light;
-  if (pixels == 0) return light;
-  light.statistics.saturated_share = static_cast<double>(saturated) / static_cast<double>(pixels);
+  if (snrs.empty()) return light;
+  light.statistics.saturated_share =
+      static_cast<double>(saturated) / static_cast<double>(snrs.size());
   const auto place =
       static_cast<std::ptrdiff_t>(dark_quantile * static_cast<double>(snrs.size() - 1));
   std::ranges::nth_element(snrs, snrs.begin() + place);
   light.statistics.dark_snr = snrs[static_cast<std::size_t>(place)];
-  light.mean_electrons = sum / static_cast<double>(snrs.size());
-  light.mean_deviation = std::sqrt(variance) / static_cast<double>(snrs.size());
+  if (telling == 0) return light;
+  light.clipped_share = static_cast<double>(clipped) / static_cast<double>(telling);
+  light.mean_electrons = sum / static_cast<double>(telling);
+  light.mean_deviation = std::sqrt(variance) / static_cast<double>(telling);
   return light;
 }
 

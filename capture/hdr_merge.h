@@ -57,13 +57,18 @@ class HdrMerge {
   double clipping_code_;
 };
 
-/// Light of one exposure above black, over the pixels where `footprint` is 1.
+/// Light of one exposure above black, over the pixels where `footprint` is 1. Samples whose black
+/// frame is clipped already, by what leaks, tell nothing of it; where all are, it is too bright.
 struct FrameLight {
   ExposureStatistics statistics;
+  double clipped_share = 0.0;   ///< of samples: saturated, and not by what leaks
   double mean_electrons = 0.0;  ///< above black; a clipped pixel counts as what it clipped at
-  double mean_deviation = 0.0;  ///< standard deviation of that mean, from noise alone
+  double mean_deviation = 0.0;  ///< standard deviation of that mean, from noise alone; 0: untold
   bool stands_out() const { return mean_electrons > 8.0 * mean_deviation; }
-  bool lit() const { return statistics.saturated_share > 0.0 || stands_out(); }
+  bool tells() const { return mean_deviation > 0.0; }
+  bool lit() const {
+    return clipped_share > 0.0 || stands_out() || (!tells() && statistics.saturated_share > 0.0);
+  }
 };
 /// `footprint` without hot pixels: one that saturates counts as light.
 FrameLight measure_light(const CameraCalibration& camera,

@@ -67,7 +67,7 @@ std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
   if (!rate) return std::nullopt;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     const double expected = *rate * times[i];
-    const bool provable = expected > 20.0 * lights[i].mean_deviation;
+    const bool provable = lights[i].tells() && expected > 20.0 * lights[i].mean_deviation;
     if (provable && lights[i].mean_electrons < 0.2 * expected) return i;
   }
   return std::nullopt;

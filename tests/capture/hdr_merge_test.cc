@@ -10,6 +10,7 @@
 
 #include "base/io/image_io.h"
 #include "capture/hdr_file.h"
+#include "capture/region_taker.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::capture {
@@ -188,6 +189,22 @@ TEST(HdrMerge, ScalesTheBlackFrameToTheMeasuredExposure) {
   const ExposurePair pair{&light, &black, 1.1, 1.0};
   const HdrImage hdr = HdrMerge(c, Image<std::uint8_t>(kWidth, kHeight, 1)).merge({&pair, 1});
   EXPECT_NEAR(hdr.radiance.at(3, 3), (1000.0 - 110.0) * 2.5 / 1.1 / 1e6, 1e-9);
+}
+
+// In the long exposure what leaks fills every pixel alone: nothing is above it, and nothing missing.
+TEST(FindBlackFrame, TellsALeakThatClipsFromABlackFrame) {
+  const CameraCalibration c = camera();
+  const Image<std::uint8_t> footprint(kWidth, kHeight, 1, 1);
+  const auto light_of = [&](std::uint16_t light, std::uint16_t black, double seconds) {
+    const Image<std::uint16_t> frame(kWidth, kHeight, 3, light);
+    const Image<std::uint16_t> dark(kWidth, kHeight, 3, black);
+    return measure_light(c, {&frame, &dark, seconds, seconds}, footprint, 0.05);
+  };
+  const std::vector<double> seconds{0.5, 8.0};
+  const FrameLight lit = light_of(1000, 500, 0.5);
+  EXPECT_TRUE(lit.lit());
+  EXPECT_EQ(find_black_frame(std::vector{lit, light_of(4095, 4095, 8.0)}, seconds), std::nullopt);
+  EXPECT_EQ(find_black_frame(std::vector{lit, light_of(700, 700, 8.0)}, seconds), 1u);
 }
 
 TEST(FindHotPixels, FindsNoneInNoise) {
