@@ -335,9 +335,12 @@ std::string Sequence::why_masked(const HdrImage& hdr) const {
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i] != 0 && hdr.saturated.samples()[i] != 0) ++saturated;
   }
-  if (pixels > 0 && saturated == pixels) {
-    return "every pixel is saturated even at the shortest exposure: close the aperture or dim the "
-           "lamp, bring the calibration up to date, and start a new session";
+  if (pixels > 0 && 2 * saturated >= pixels) {
+    return fmt::format(
+        "{} of {} pixels on the sample are saturated even at the shortest exposure: close the "
+        "aperture or dim the lamp, bring the calibration up to date, and start a new session",
+        saturated,
+        pixels);
   }
   return fmt::format(
       "no surface cell has {:.0f} % of its area on usable pixels ({} of the {} on the sample are "

@@ -19,21 +19,6 @@ using support::FileOperation;
 
 constexpr int kPrefixes = 48;
 
-/// Facts go to a real log, whose writes are recorded like all others.
-class LogSink : public EventSink {
- public:
-  explicit LogSink(EventLog& log) : log_(log) {}
-  void progress(const Progress& /*progress*/) override {}
-  Result<void> fact(std::string_view type, const nlohmann::json& data) override {
-    const auto appended = log_.append(type, data);
-    if (!appended) return appended.error();
-    return ok();
-  }
-
- private:
-  EventLog& log_;
-};
-
 CaptureTask task() {
   CaptureTask task = support::tiny_task(support::tiny_rig());
   task.options.patterns.held_out_lights = 2;
@@ -43,7 +28,7 @@ CaptureTask task() {
 Result<CaptureSummary> run(FileOperations& files, const fs::path& directory) {
   const auto log = EventLog::open(files, directory / "events.jsonl");
   if (!log) return log.error();
-  LogSink events(**log);
+  support::LogSink events(**log);  // its writes are recorded like all others
   support::TinyStation tiny(support::tiny_rig());
   return capture_session(task(), tiny.station(), {directory, files, events}, {});
 }

@@ -16,6 +16,7 @@ namespace opaline::capture {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -41,9 +42,15 @@ class SequenceTest : public ::testing::Test {
   Result<CaptureSummary> run(const fs::path& directory,
                              FileOperations& files,
                              std::stop_token stop = {}) {
-    support::TinyStation tiny(options_);
     events_ = std::make_unique<support::RecordingSink>();
-    const Workplace workplace{directory, files, *events_, free_bytes_};
+    return run(directory, files, *events_, std::move(stop));
+  }
+  Result<CaptureSummary> run(const fs::path& directory,
+                             FileOperations& files,
+                             EventSink& events,
+                             std::stop_token stop) {
+    support::TinyStation tiny(options_);
+    const Workplace workplace{directory, files, events, free_bytes_};
     auto summary = capture_session(task_, tiny.station(), workplace, stop);
     lamp_on_ = tiny.rig().status()->lamp_on;
     exposures_ = tiny.rig().status()->exposures;
@@ -101,9 +108,7 @@ TEST_F(SequenceTest, CapturesEveryRegionAndHeldOutLightIntoADataset) {
   EXPECT_TRUE(fs::exists(dir_.path() / "hdr" / "region_1_1.exr"));
 }
 
-// The rig's truth under each region against what was measured, in units of the measured deviation:
-// with a perfect calibration the squares average 1, but for what the camera's blur and the
-// pixels' sampling of one-millimetre cells add.
+// The rig's truth under each region against what was measured: how well, the next test says.
 TEST_F(SequenceTest, MeasuresTheRadianceTheSampleSends) {
   options_.camera.psf_sigma_px = 0.0;
   task_ = support::tiny_task(options_);
@@ -139,6 +144,35 @@ TEST_F(SequenceTest, MeasuresTheRadianceTheSampleSends) {
     }
     EXPECT_LT(worst, 0.03) << measured.name;  // the hills bend by about 2 % within a cell
   }
+}
+
+// Two stations that differ in their noise alone: their differences, in units of the deviations that
+// go with them, have squares of mean 1. n = 11 lights x 64 cells x 3 channels scatter it by
+// sqrt(2 / n) = 0.03; four times that.
+TEST_F(SequenceTest, KnowsTheVarianceOfWhatItMeasured) {
+  options_.camera.hot_pixel_fraction = 0.0;
+  const testing::TemporaryDirectory other;
+  options_.seed = 1;
+  ASSERT_TRUE(run(dir_.path()));
+  options_.seed = 2;
+  ASSERT_TRUE(run(other.path()));
+  const auto a = read_dataset(dir_.path());
+  const auto b = read_dataset(other.path());
+  ASSERT_TRUE(a && b);
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < a->illuminations.size(); ++i) {
+    const Illumination& one = a->illuminations[i];
+    const Illumination& two = b->illuminations[i];
+    for (std::size_t k = 0; k < one.radiance.samples().size(); ++k) {
+      const double difference = one.radiance.samples()[k] - two.radiance.samples()[k];
+      sum += difference * difference /
+             (one.radiance_variance.samples()[k] + two.radiance_variance.samples()[k]);
+      count += 1.0;
+    }
+  }
+  EXPECT_EQ(count, 11 * 64 * 3);
+  EXPECT_NEAR(sum / count, 1.0, 0.12);
 }
 
 TEST_F(SequenceTest, GivesTheIrradianceThatTheProjectorSends) {
@@ -182,12 +216,22 @@ TEST_F(SequenceTest, TakesNothingAgainThatIsThere) {
   EXPECT_EQ(results_of(dir_.path()), undisturbed());
 }
 
-TEST_F(SequenceTest, StopsWhenAskedWithTheLampDark) {
+/// Asks to stop once the second light is on.
+class StoppingSink : public NullSink {
+ public:
+  void progress(const Progress& progress) override {
+    if (progress.detail["light"] == 2 && progress.detail.contains("exposure")) stop.request_stop();
+  }
   std::stop_source stop;
-  stop.request_stop();
-  const auto summary = run(dir_.path(), stop.get_token());
+};
+
+TEST_F(SequenceTest, StopsWhenAskedWithTheLampDark) {
+  StoppingSink events;
+  const auto summary = run(dir_.path(), support::unsynced_files(), events, events.stop.get_token());
   ASSERT_FALSE(summary);
   EXPECT_EQ(summary.error().code, ErrorCode::kCancelled);
+  EXPECT_TRUE(fs::exists(dir_.path() / "frames" / "region_0_0" / "index.json"));
+  EXPECT_FALSE(fs::exists(dir_.path() / "frames" / "region_0_1" / "index.json"));
   EXPECT_FALSE(lamp_on_);
 }
 
@@ -318,10 +362,14 @@ TEST_F(SequenceTest, SaysBeforehandThatTheDiskIsTooFullAndGoesOnOnceThereIsRoom)
 }
 
 TEST_F(SequenceTest, StopsNamingFileAndBytesWhenTheDiskFillsUpAndGoesOnOnceThereIsRoom) {
-  for (const std::size_t room : {30'000u, 150'000u, 400'000u}) {
+  for (const std::size_t room : {60'000u, 150'000u, 400'000u}) {
     support::FullDisk full(room);
-    const auto summary = run(dir_.path(), full);
+    const auto log = EventLog::open(full, dir_.path() / "events.jsonl");
+    ASSERT_TRUE(log && (*log)->append("job.started", {}));
+    support::LogSink events(**log);
+    const auto summary = run(dir_.path(), full, events, {});
     ASSERT_FALSE(summary) << room;
+    EXPECT_TRUE((*log)->append("job.finished", {{"message", summary.error().message}})) << room;
     EXPECT_EQ(summary.error().code, ErrorCode::kUnavailable);
     EXPECT_THAT(summary.error().message,
                 AllOf(HasSubstr(dir_.path().string()), HasSubstr("bytes"), HasSubstr("no space")));
@@ -400,6 +448,39 @@ TEST_F(SequenceTest, StopsWhenTooManyRegionsAreSaturatedAndSaysWhatWouldHelp) {
   EXPECT_THAT(summary.error().message,
               AllOf(HasSubstr("3 of 4 regions"), HasSubstr("saturated"), HasSubstr("aperture")));
   EXPECT_EQ(events_->facts("region.unusable").size(), 3u);
+}
+
+// The projector's light falls off from the middle of its picture, which lies over region_1_1. Of this
+// region the dimmest cell is made to clip in the shortest exposure, and only just.
+TEST_F(SequenceTest, MasksARegionThatIsAllSaturatedAndGoesOn) {
+  options_.projector.offset_x_px = 0.0;
+  options_.projector.offset_y_px = 0.0;
+  options_.projector.vignetting = {-1.8, 0.85, 0.0};
+  options_.projector.black_level = 0.0;
+  task_ = support::tiny_task(options_);
+  const testing::TemporaryDirectory dim;
+  ASSERT_TRUE(run(dim.path()));
+  const auto all = read_dataset(dim.path());
+  ASSERT_TRUE(all);
+  double dimmest = 1e9;
+  for (std::size_t i = 0; i < 64; ++i) {
+    dimmest = std::min<double>(dimmest, all->illuminations[3].radiance.samples()[3 * i]);
+  }
+  const double clipping = task_.calibration.camera.full_scale_electrons();
+  options_.camera.sensitivity.fill(1.15 * clipping / (dimmest / 30.0));
+  task_ = support::tiny_task(options_);
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(summary->unusable, Contains("region_1_1"));
+  const auto unusable = events_->facts("region.unusable");
+  ASSERT_FALSE(unusable.empty());
+  EXPECT_THAT(unusable[0]["message"].get<std::string>(), HasSubstr("saturated even at"));
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set);
+  EXPECT_EQ(set->illuminations[3].mask, Image<std::uint8_t>(8, 8, 1, 0));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NE(set->illuminations[i].mask, Image<std::uint8_t>(8, 8, 1, 0)) << i;
+  }
 }
 
 TEST_F(SequenceTest, TellsTooFewPixelsFromSaturatedOnes) {

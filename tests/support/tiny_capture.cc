@@ -74,6 +74,11 @@ std::vector<Progress> RecordingSink::progresses() const {
   return progresses_;
 }
 
+Result<void> LogSink::fact(std::string_view type, const nlohmann::json& data) {
+  const auto appended = log_.append(type, data);
+  return appended ? ok() : Result<void>(appended.error());
+}
+
 namespace {
 
 std::unique_ptr<sim::Rig> make_rig(const sim::RigOptions& options, Clock& clock) {

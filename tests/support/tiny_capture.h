@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "base/event_log.h"
 #include "base/events.h"
 #include "base/files.h"
 #include "capture/sequence.h"
@@ -40,6 +41,17 @@ class RecordingSink : public EventSink {
   mutable std::mutex mutex_;
   std::vector<Fact> facts_;           // guarded by mutex_
   std::vector<Progress> progresses_;  // guarded by mutex_
+};
+
+/// Facts go to a real log, as a job's do.
+class LogSink : public NullSink {
+ public:
+  /// `log` outlives us.
+  explicit LogSink(EventLog& log) : log_(log) {}
+  Result<void> fact(std::string_view type, const nlohmann::json& data) override;
+
+ private:
+  EventLog& log_;
 };
 
 /// The tiny station with its devices, on a clock that stands still unless somebody waits.
