@@ -20,6 +20,7 @@ using reconstruct::InverseOptions;
 constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 2> kMethodNames{"lbfgs", "as_published"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -91,7 +92,10 @@ void visit_reconstruction(Fields& fields, InverseOptions& r) {
                 Range::at_least(0));
   fields.number(
       {"regularization", "weight of smoothness; 0: none"}, r.regularization, Range::at_least(0));
-  fields.whole({"max_iterations", "of L-BFGS, per channel; 0: the homogeneous fit"},
+  fields.one_of({"method", "of minimisation; as_published (Wang 2008) is for comparison only"},
+                r.method,
+                kMethodNames);
+  fields.whole({"max_iterations", "per channel; 0: the homogeneous fit"},
                r.max_iterations,
                Range::between(0, 100000));
   fields.number({"tolerance", "of every diffusion solve, relative residual"},

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruct/published_step.h"
+
 namespace opaline::reconstruct {
 namespace {
 
@@ -74,17 +76,29 @@ std::optional<StopReason> ChannelSolver::reason_to_stop(const ChannelReport& rep
   return std::nullopt;
 }
 
-Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {
-  const auto objective = [this](std::span<const double> x, std::stop_token token) {
+Result<StepOutcome> ChannelSolver::step(LbfgsState& state,
+                                        const Bounds& box,
+                                        std::stop_token stop) {
+  const ObjectiveFunction evaluate = [this](std::span<const double> x, std::stop_token token) {
     return objective_.evaluate(x, std::move(token));
   };
+  if (options_.method == Method::kLbfgs) {
+    return lbfgs_step(state, box, {}, evaluate, std::move(stop));
+  }
+  const auto value = [this](std::span<const double> x, std::stop_token token) {
+    return objective_.value(x, std::move(token));
+  };
+  return published_step(state, box, {evaluate, value}, std::move(stop));
+}
+
+Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {
   const Bounds box = bounds();
   for (;;) {
     if (const auto reason = reason_to_stop(progress.report)) {
       progress.report.stop_reason = *reason;
       return ok();
     }
-    const auto outcome = lbfgs_step(progress.state, box, {}, objective, stop);
+    const auto outcome = step(progress.state, box, stop);
     if (!outcome) return outcome.error();
     if (*outcome == StepOutcome::kNoDescent) {
       progress.report.stop_reason = StopReason::kNoDescent;

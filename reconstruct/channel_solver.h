@@ -30,6 +30,7 @@ class ChannelSolver {
 
  private:
   Result<ChannelProgress> begin(std::stop_token stop);
+  Result<StepOutcome> step(LbfgsState& state, const Bounds& box, std::stop_token stop);
   Result<void> iterate(ChannelProgress& progress, std::stop_token stop);
   void record(ChannelProgress& progress);
   std::optional<StopReason> reason_to_stop(const ChannelReport& report) const;

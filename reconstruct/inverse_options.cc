@@ -37,6 +37,10 @@ std::string_view to_string(BackEnd back_end) {
   return "auto";
 }
 
+std::string_view to_string(Method method) {
+  return method == Method::kLbfgs ? "lbfgs" : "as_published";
+}
+
 Result<void> validate(const InverseOptions& o) {
   if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");
   if (!not_negative(o.regularization)) return expected("regularization", o.regularization, ">= 0");

@@ -18,6 +18,13 @@ enum class BackEnd : std::uint8_t {
 };
 std::string_view to_string(BackEnd back_end);  ///< "auto" | "host" | "vulkan" | "reference"
 
+/// How the objective is minimised.
+enum class Method : std::uint8_t {
+  kLbfgs,        ///< limited-memory BFGS in (log sigma_s', log sigma_a) (reconstruct/lbfgs.h)
+  kAsPublished,  ///< Wang 2008, Table I (reconstruct/published_step.h), for comparison only
+};
+std::string_view to_string(Method method);  ///< "lbfgs" | "as_published"
+
 /// Bounds of a coefficient, 1/mm; 0 < lowest < highest.
 struct CoefficientBounds {
   double lowest = 0.0;
@@ -34,7 +41,8 @@ struct InverseOptions {
   double model_error = 0.01;
   /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
   double regularization = 300.0;
-  int max_iterations = 150;  ///< of L-BFGS, per channel; 0 keeps the homogeneous fit
+  Method method = Method::kLbfgs;
+  int max_iterations = 150;  ///< per channel; 0 keeps the homogeneous fit
   double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
   /// Discrepancy principle: stop once chi^2 <= discrepancy times the number of data; >= 0, 0 never stops so. 1 is
   /// Morozov's; the default is lower because model_error counts generously, and the prior keeps the noise out.
@@ -43,7 +51,7 @@ struct InverseOptions {
       0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0
   CoefficientBounds absorption{1e-5, 10.0};
   CoefficientBounds reduced_scattering{0.02, 100.0};
-  int checkpoint_every = 10;  ///< iterations of L-BFGS; >= 1
+  int checkpoint_every = 10;  ///< iterations; >= 1
   BackEnd back_end = BackEnd::kAuto;
   int threads = 0;  ///< of the host back end; 0: one a core
 };

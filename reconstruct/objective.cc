@@ -211,6 +211,18 @@ Result<Evaluation> Objective::evaluate(std::span<const double> p, std::stop_toke
   return out;
 }
 
+Result<double> Objective::value(std::span<const double> p, std::stop_token stop) {
+  ENSURE(p.size() == parameter_count());
+  const ChannelCoefficients coefficients = to_coefficients(p);
+  if (auto solved = solve_forward(coefficients, stop); !solved) return solved.error();
+  observe();
+  Evaluation out;
+  out.value = 0.5 * residuals();
+  MediumGradient unused(problem_.block.cell_count());
+  regularize(coefficients, out, unused);
+  return out.value;
+}
+
 Result<std::vector<std::vector<double>>> Objective::predict(const ChannelCoefficients& coefficients,
                                                             std::stop_token stop) {
   if (auto solved = solve_forward(coefficients, stop); !solved) return solved.error();

@@ -36,6 +36,8 @@ class Objective {
 
   std::size_t parameter_count() const { return 2 * problem_.block.cell_count(); }
   Result<Evaluation> evaluate(std::span<const double> p, std::stop_token stop);
+  /// J alone: half the solves.
+  Result<double> value(std::span<const double> p, std::stop_token stop);
 
   /// Radiance per illumination on the seen face's cells; no adjoint solve.
   Result<std::vector<std::vector<double>>> predict(const ChannelCoefficients& coefficients,

@@ -19,6 +19,7 @@ Json to_json(const InverseOptions& o) {
   return {{"source", to_string(o.source)},
           {"deposit", to_string(o.deposit)},
           {"boundary", to_string(o.boundary)},
+          {"method", to_string(o.method)},
           {"model_error", o.model_error},
           {"regularization", o.regularization},
           {"max_iterations", o.max_iterations},

@@ -1,4 +1,4 @@
-#include "bench/transport_dataset.h"
+#include "bench/inverse/transport_dataset.h"
 
 #include <fmt/format.h>
 
@@ -96,7 +96,7 @@ Dataset dataset_from_transport(const TransportResponses& t,
                                const TransportDatasetOptions& options) {
   Dataset dataset = empty_dataset(t);
   const int n = options.regions;
-  const int w = t.patches_x / n;
+  const int w = t.patches_x / n;  // at least one patch
   const int h = t.patches_y / n;
   const auto add = [&](const char* kind, bool held_out, const Rectangle& lit) {
     dataset.illuminations.push_back(

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "base/material.h"
+#include "base/transport_responses.h"
+
+namespace opaline::bench {
+
+/// Radiance on z_max for unit irradiance on each of patches x patches squares of z_min, by a discretisation that shares
+/// nothing with the reconstruction's: trilinear finite elements on nodes twice as close as the cells,
+///
+///   int kappa grad phi . grad v + int sigma_a phi v + int_surface phi v / (2 A) = int Q v,
+///   Q = alpha' sigma_t' q e^(-int sigma_t')                                           (docs/physics.md)
+///
+/// with Q integrated exactly along the ray within each element, and the flux phi / (2 A) averaged over each cell of the
+/// face. The model (A, camera equation) is the reconstruction's: what is told apart is discretisation and inversion.
+/// Double precision, relative residual 1e-9. Tens of seconds for a quarter of a million nodes on two cores.
+TransportResponses finite_element_responses(const Material& material, int patches);
+
+}  // namespace opaline::bench

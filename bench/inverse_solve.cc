@@ -1,0 +1,188 @@
+// The inversion on known light transport, without a capture: how many solves it takes to the noise, and how well the
+// material that it finds relights under lights that it never saw. Prints one JSON object a figure (bench/figure.h).
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/clock.h"
+#include "base/files.h"
+#include "base/io/transport_io.h"
+#include "bench/figure.h"
+#include "bench/inverse/finite_elements.h"
+#include "bench/inverse/transport_dataset.h"
+#include "reconstruct/back_end.h"
+#include "reconstruct/inverse_solver.h"
+#include "reconstruct/prediction.h"
+#include "reconstruct/relighting_error.h"
+#include "sim/scene.h"
+
+namespace opaline::bench {
+namespace {
+
+namespace fs = std::filesystem;
+using reconstruct::InverseOptions;
+using reconstruct::diffusion::FluenceSolver;
+
+constexpr int kPatches = 8;
+
+struct Case {
+  std::string name;
+  TransportResponses responses;
+  int regions = 4;
+};
+
+fs::path cache_directory() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "opaline/bench";
+  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".cache/opaline/bench";
+  return fs::temp_directory_path() / "opaline-bench";
+}
+
+/// From the cache, or computed and put there.
+Result<TransportResponses> elements_of(const std::string& name, const sim::SceneOptions& scene) {
+  const fs::path file = cache_directory() / fmt::format("elements-{}.transport", name);
+  if (auto stored = read_transport(file); stored && stored->scene == sim::to_json(scene))
+    return stored;
+  const auto material = sim::make_material(scene);
+  if (!material) return material.error();
+  fmt::print(stderr, "{}: finite elements, some minutes the first time\n", name);
+  TransportResponses responses = finite_element_responses(*material, kPatches);
+  responses.scene = sim::to_json(scene);
+  std::error_code ignored;
+  fs::create_directories(file.parent_path(), ignored);
+  if (auto kept = write_transport(system_files(), file, responses); !kept)
+    fmt::print(stderr, "not kept: {}\n", kept.error().message);
+  return responses;
+}
+
+Result<Case> make_case(const std::string& name) {
+  if (name == "48x48x12" || name == "48x48x12-n8") {
+    auto responses = elements_of("48x48x12", {});
+    if (!responses) return responses.error();
+    return Case{name, *std::move(responses), name == "48x48x12" ? 4 : 8};
+  }
+  if (!name.ends_with(".transport"))
+    return invalid_argument(
+        fmt::format("no case '{}'; there are 48x48x12, 48x48x12-n8 and *.transport files", name));
+  auto responses = read_transport(name);
+  if (!responses) return responses.error();
+  return Case{fs::path(name).stem(), *std::move(responses), 4};
+}
+
+Dataset only(const Dataset& dataset, const std::string& kind) {
+  Dataset some = dataset;
+  std::erase_if(some.illuminations,
+                [&](const Illumination& i) { return !i.name.starts_with(kind); });
+  return some;
+}
+
+/// Relighting errors by kind of light, and E = sum (R' - R)^2 / sum R^2 over all patches, cells and channels.
+Result<void> judge(const Case& which,
+                   const char* what,
+                   const Dataset& dataset,
+                   const Material& material,
+                   const InverseOptions& options,
+                   FluenceSolver& solver) {
+  const std::string prefix = fmt::format("inverse.{}", what);
+  for (const char* kind : {"region", "shifted", "larger", "smaller", ""}) {
+    const Dataset some = only(dataset, kind);
+    if (some.illuminations.empty()) continue;
+    const auto pictures = reconstruct::predict(some, material, options, solver, {});
+    if (!pictures) return pictures.error();
+    const bool held_out = std::string_view(kind) != "region";
+    const auto error = reconstruct::relighting_error(some, *pictures, held_out);
+    const std::string name = *kind == 0 ? which.name : fmt::format("{}, {}", which.name, kind);
+    print_figure(prefix + "relighting_error", name, error.error, "1");
+    print_figure(prefix + "noise_floor", name, error.noise_floor, "1");
+  }
+  const Dataset patches = patch_dataset(which.responses);
+  const auto predicted = reconstruct::predict(patches, material, options, solver, {});
+  if (!predicted) return predicted.error();
+  const auto error = reconstruct::relighting_error(patches, *predicted, true);
+  print_figure(prefix + "bssrdf_error", which.name, error.error * error.error, "1");
+  return ok();
+}
+
+double peak_megabytes() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+Result<void> run(const Case& which, TransportDatasetOptions data, const InverseOptions& options) {
+  data.regions = which.regions;
+  const Dataset dataset = dataset_from_transport(which.responses, data);
+  const auto solver = reconstruct::make_solver(options);
+  if (!solver) return solver.error();
+  NullSink events;
+  const SystemClock clock;
+  const auto result =
+      reconstruct::reconstruct_material(dataset, options, {**solver, events, clock}, {});
+  if (!result) return result.error();
+  double most = 0.0;
+  for (std::size_t c = 0; c < kColorChannels; ++c) {
+    const auto& channel = result->channels[c];
+    const std::string name = fmt::format("{}, {}", which.name, kChannelNames[c]);
+    most = std::max(most, static_cast<double>(channel.solves));
+    print_figure(
+        "inverse.chi_squared_per_datum", name, channel.history.back().chi_squared_per_datum, "1");
+    print_figure("inverse.iterations", name, channel.history.back().iteration, "1");
+  }
+  print_figure("inverse.solves", which.name, most, "1");  // of the channel that took most
+  print_figure("inverse.seconds", which.name, result->seconds, "s");
+  print_figure("inverse.peak_mb", which.name, peak_megabytes(), "MB");
+  if (const auto scene = sim::scene_from_json(which.responses.scene)) {
+    const auto truth = sim::make_material(*scene);
+    if (!truth) return truth.error();
+    if (auto judged = judge(which, "truth_", dataset, *truth, options, **solver); !judged)
+      return judged;
+  }
+  return judge(which, "", dataset, result->material, options, **solver);
+}
+
+int run_all(const std::vector<std::string>& names,
+            const TransportDatasetOptions& data,
+            const InverseOptions& options) {
+  for (const std::string& name : names) {
+    const auto which = make_case(name);
+    const auto done = which ? run(*which, data, options) : Result<void>(which.error());
+    if (done) continue;
+    fmt::print(stderr, "{}: {}\n", name, done.error().message);
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace opaline::bench
+
+int main(int argc, char** argv) {
+  using namespace opaline;  // NOLINT(google-build-using-namespace)
+  CLI::App app(
+      "Reconstructs samples from known light transport and judges them by lights they never saw.\n"
+      "Example: inverse_solve --case 48x48x12 --regularization 100");
+  std::vector<std::string> names{"48x48x12", "48x48x12-n8", "sim/data/demo_marble.transport"};
+  bench::TransportDatasetOptions data;
+  reconstruct::InverseOptions options;
+  app.add_option("--case", names, "48x48x12, 48x48x12-n8 (finite elements), or a transport file")
+      ->take_all();
+  app.add_option("--noise", data.noise, "Relative noise added");
+  app.add_option("--seed", data.seed, "Of the noise");
+  app.add_option("--regularization", options.regularization);
+  app.add_option("--model-error", options.model_error);
+  app.add_option("--discrepancy", options.discrepancy);
+  app.add_option("--stalled", options.stalled);
+  app.add_option("--tolerance", options.tolerance);
+  app.add_option("--max-iterations", options.max_iterations);
+  app.add_option("--threads", options.threads);
+  CLI11_PARSE(app, argc, argv);
+  return bench::run_all(names, data, options);
+}
