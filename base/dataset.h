@@ -15,7 +15,7 @@ namespace opaline {
 ///
 /// Shapes: rasters over the cells of a face as Block says, three channels (RGB).
 struct Illumination {
-  std::string name;         ///< "region_2_1", "held_out_half_shifted_0"
+  std::string name;         ///< "region_2_1", "held_out_shifted_0"
   bool held_out = false;    ///< kept from the fit, for validation
   Image<float> irradiance;  ///< E on the lit face before Fresnel, W/mm^2; fractional at the edges
                             ///< of a region

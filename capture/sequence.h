@@ -46,16 +46,18 @@ struct CaptureSummary {
 /// dataset files are those of an undisturbed one, bit for bit, where the devices deliver the same
 /// frames. The lamp is dark when it returns.
 ///
-/// A light clipped all over even at the shortest exposure, or black while the lamp is seen to work,
-/// is masked and the session goes on, until fewer than `usable_share` of the regions can be used.
-/// A dead lamp stops it at once. Lights that were taken at other exposures than the black frames,
+/// A light without one usable cell, clipped even at the shortest exposure or seen by too few good
+/// pixels, or one that is black while the lamp is seen to work, is masked and the session goes on,
+/// until fewer than `usable_share` of the regions can be used. A dead lamp stops it: when a light
+/// and the whole picture lit are both black, at every retry. Lights that were taken at other exposures than the black frames,
 /// since options or devices have changed, are taken again.
 ///
 /// Facts: capture.planned, region.captured, region.retaken, region.damaged, region.unusable,
 /// capture.completed. Progress: step "capture", detail {light, lights, region, exposure}:
 /// "region_1_2", the fifth of 24, exposed for "0.5 s".
-/// Errors: kInvalidArgument for options, calibration or geometry; kUnavailable for devices, disk or
-/// lamp, with the remedy; kTimeout; kCancelled.
+/// Errors: kInvalidArgument for options, calibration or geometry, for a camera that is not the
+/// calibrated one, and for frames of a newer version; kUnavailable for devices, disk or lamp, with
+/// the remedy; kTimeout; kCancelled.
 Result<CaptureSummary> capture_session(const CaptureTask& task,
                                        const Station& station,
                                        const Workplace& workplace,
