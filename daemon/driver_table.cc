@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/runtime_paths.h"
 #include "daemon/simulated_rig.h"
 #include "drivers/replay/replay_camera.h"
 #include "drivers/replay/replay_projector.h"
@@ -26,6 +27,9 @@ Result<std::unique_ptr<sim::RigPort>> connect_rig(const config::RigConfig& rig,
     auto built = build_rig(rig.sim, events, stop);
     if (!built) return built.error();
     return std::unique_ptr<sim::RigPort>(*std::move(built));
+  }
+  if (rig.sim.socket.empty()) {  // then it lies in our own directory, if that is ours
+    if (const auto own = runtime_directory(); !own) return own.error();
   }
   const auto program = program_beside("opaline-rig");
   if (!program) return program.error();
