@@ -293,9 +293,7 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   declare_deeds(app, arguments, status_code);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app;
   Arguments arguments;
   int status_code = kDone;
@@ -306,8 +304,17 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
-  } catch (const std::exception& e) {
-    return report(internal_error(e.what()));
   }
   return status_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+    return kFailed;
+  }
 }

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <string>
 
 #include "base/log.h"
@@ -112,9 +113,7 @@ int exit_status(const Error& error) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   CLI::App app;
   Arguments arguments;
   declare(app, arguments);
@@ -127,4 +126,15 @@ int main(int argc, char** argv) {
   if (served) return 0;
   log::critical("opalined: {}", served.error().message);
   return exit_status(served.error());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+    return 1;
+  }
 }

@@ -10,7 +10,7 @@
 namespace opaline::daemon {
 
 /// What is known of a session at one moment; a value.
-struct SessionSnapshot {
+struct SessionSnapshot {  // NOLINT(bugprone-exception-escape): a null JSON value throws nothing
   std::string id;
   std::string name;
   std::string directory;
