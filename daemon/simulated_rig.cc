@@ -62,6 +62,7 @@ Result<pid_t> spawn(const RigProcess& process) {
   words.insert(words.end(), process.arguments.begin(), process.arguments.end());
   words.insert(words.end(), {"--socket", process.socket.string()});
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 

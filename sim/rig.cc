@@ -288,7 +288,7 @@ Result<Frame> Rig::fail_later(const Exposure& exposure, std::stop_token stop) {
   return timeout(fmt::format("simulated camera: no frame after {} s", seconds(patience)));
 }
 
-Result<Frame> Rig::finish(Exposure exposure) {
+Result<Frame> Rig::finish(const Exposure& exposure) {
   std::vector<LightStretch> lights;
   {
     const std::lock_guard lock(mutex_);

@@ -64,7 +64,7 @@ class Rig : public RigPort {
   Result<Exposure> trigger(std::uint64_t session,
                            std::chrono::nanoseconds exposure,
                            const std::stop_token& stop);
-  Result<Frame> finish(Exposure exposure);
+  Result<Frame> finish(const Exposure& exposure);
   Result<Frame> fail_later(const Exposure& exposure, std::stop_token stop);
   Image<std::uint16_t> picture(const Exposure& exposure,
                                const std::vector<LightStretch>& lights) const;

@@ -128,11 +128,12 @@ void append(std::string& bytes, auto value) {
 std::string half_exr(const std::vector<std::uint16_t>& halves_of_each_channel) {
   const auto width = static_cast<std::int32_t>(halves_of_each_channel.size());
   std::string exr("\x76\x2f\x31\x01\x02\0\0\0", 8);
-  const auto attribute = [&](std::string name, std::string type, const std::string& value) {
-    exr += name + '\0' + type + '\0';
-    append(exr, static_cast<std::int32_t>(value.size()));
-    exr += value;
-  };
+  const auto attribute =
+      [&](const std::string& name, const std::string& type, const std::string& value) {
+        exr += name + '\0' + type + '\0';
+        append(exr, static_cast<std::int32_t>(value.size()));
+        exr += value;
+      };
   std::string channels;
   for (const char* name : {"B", "G", "R"}) {
     channels += std::string(name) + '\0';

@@ -27,7 +27,7 @@ constexpr nanoseconds kTurn{33'333'333};
 /// waits.
 class RigTest : public ::testing::Test {
  protected:
-  void build(RigOptions options) {
+  void build(const RigOptions& options) {
     options_ = options;
     camera_.reset();
     projector_.reset();
