@@ -57,8 +57,8 @@ HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
   struct Term {
     double weight, seconds, leak, leak_scale, per_code, black_per_code;
   };
-  std::array<Term, kMaxExposures>
-      terms;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): filled below
+  std::array<Term, kMaxExposures> terms;
   std::size_t count = 0;
   double electrons = 0.0;
   double seconds = 0.0;
