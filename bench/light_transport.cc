@@ -17,7 +17,12 @@
 
 namespace {
 
-using namespace opaline;
+namespace bench = opaline::bench;
+namespace log = opaline::log;
+namespace sim = opaline::sim;
+using opaline::Face;
+using opaline::Material;
+using opaline::Result;
 
 constexpr int kRounds = 7;
 

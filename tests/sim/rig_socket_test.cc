@@ -213,7 +213,7 @@ TEST_F(RigSocketTest, ClaimedBytesCostNothingUntilTheyCome) {
 TEST_F(RigSocketTest, TheTruthOfManyPatchesIsReadable) {
   TransportResponses many = *support::tiny_responses();
   many.patches_x = many.patches_y = 64;
-  many.patches.assign(64 * 64, many.patches.front());
+  many.patches.assign(std::size_t{64} * 64, many.patches.front());
   rig_ = *Rig::create(options_, std::make_shared<const TransportResponses>(std::move(many)));
   auto made = RigServer::create(*rig_, socket_);
   ASSERT_TRUE(made);
