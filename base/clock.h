@@ -15,6 +15,8 @@ class Clock {
   virtual std::chrono::nanoseconds now() const = 0;
   /// Waits; false when the stop request came first. Thread-safe.
   virtual bool sleep(std::chrono::nanoseconds duration, std::stop_token stop) = 0;
+  /// How many of its seconds pass in a real one: what is told to people is in real ones.
+  virtual double pace() const { return 1.0; }
 };
 
 /// CLOCK_MONOTONIC, run `factor` times as fast from this clock's making on: at 1000, a second passes in a millisecond.
@@ -23,6 +25,7 @@ class SystemClock : public Clock {
   explicit SystemClock(double factor = 1.0);
   std::chrono::nanoseconds now() const override;
   bool sleep(std::chrono::nanoseconds duration, std::stop_token stop) override;
+  double pace() const override { return factor_; }
 
  private:
   double factor_;

@@ -369,7 +369,7 @@ void Sequence::report(const std::string& region, std::optional<nanoseconds> expo
       {"light", summary_.lights + 1}, {"lights", patterns_.lights.size()}, {"region", region}};
   if (exposure) progress.detail["exposure"] = fmt::format("{:.3g} s", seconds(*exposure));
   if (summary_.taken > 0) {
-    const double elapsed = seconds(station_.clock.now() - started_);
+    const double elapsed = seconds(station_.clock.now() - started_) / station_.clock.pace();
     progress.seconds_left = elapsed / summary_.taken * (total - summary_.lights);
   }
   work_.events.progress(progress);

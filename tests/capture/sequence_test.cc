@@ -583,5 +583,38 @@ TEST_F(SequenceTest, TellsHowFarItIs) {
   EXPECT_TRUE(std::ranges::is_sorted(all, {}, &Progress::fraction));
 }
 
+/// Another clock's time, a hundred seconds of which pass in a real one.
+class HastyClock : public Clock {
+ public:
+  explicit HastyClock(Clock& clock) : clock_(clock) {}
+  std::chrono::nanoseconds now() const override { return clock_.now(); }
+  bool sleep(std::chrono::nanoseconds duration, std::stop_token stop) override {
+    return clock_.sleep(duration, std::move(stop));
+  }
+  double pace() const override { return 100.0; }
+
+ private:
+  Clock& clock_;
+};
+
+TEST_F(SequenceTest, TellsTheTimeLeftInRealSeconds) {
+  const auto seconds_left = [&](bool hasty) {
+    const opaline::testing::TemporaryDirectory directory;
+    support::TinyStation tiny(options_);
+    HastyClock clock(tiny.clock());
+    const Station station = tiny.station();
+    support::RecordingSink sink;
+    EXPECT_TRUE(capture_session(
+        task_,
+        {station.camera, station.projector, hasty ? static_cast<Clock&>(clock) : station.clock},
+        {directory.path(), support::unsynced_files(), sink},
+        {}));
+    return sink.progresses().back().seconds_left.value_or(0.0);
+  };
+  const double left = seconds_left(false);
+  EXPECT_GT(left, 0.0);
+  EXPECT_NEAR(seconds_left(true), left / 100.0, 1e-6 * left);
+}
+
 }  // namespace
 }  // namespace opaline::capture
