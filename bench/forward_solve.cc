@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -226,7 +227,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 }  // namespace opaline::bench
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   CLI::App app(
       "Times 16 illuminations of one medium to a float64 residual of 1e-6 and compares with "
       "peers.\n"
@@ -240,4 +241,7 @@ int main(int argc, char** argv) {
   app.add_flag("!--no-relaxation", arguments.relaxation, "Leave hierarchical relaxation out");
   CLI11_PARSE(app, argc, argv);
   return opaline::bench::run(arguments);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
 }
