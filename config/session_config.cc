@@ -101,7 +101,7 @@ void visit_reconstruction(Fields& fields, InverseOptions& r) {
   fields.number({"tolerance", "of every diffusion solve, relative residual"},
                 r.tolerance,
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
-  fields.number({"discrepancy", "stop at chi^2 <= this times the number of data; 0: never"},
+  fields.number({"discrepancy", "stop at chi^2 <= this times what noise alone makes; 0: never"},
                 r.discrepancy,
                 Range::at_least(0));
   fields.number({"stalled", "stop when ten iterations gain less than this fraction"},

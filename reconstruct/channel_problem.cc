@@ -90,6 +90,7 @@ Result<void> add_data(const Illumination& i,
     const double model = model_error * std::hypot(l, level);
     out.radiance[p] = l;
     out.weight[p] = 1.0 / (variance + model * model);
+    out.noise += out.weight[p] * variance;
   }
   return ok();
 }
@@ -101,7 +102,7 @@ Result<ChannelIllumination> make_illumination(const Dataset& dataset,
   if (auto fits = check_shapes(dataset, illumination); !fits) return fits.error();
   auto q = transmitted(dataset, illumination, channel);
   if (!q) return q.error();
-  ChannelIllumination out{*std::move(q), {}, {}};
+  ChannelIllumination out{*std::move(q), {}, {}, 0.0};
   if (auto added = add_data(illumination, channel, model_error, out); !added) return added.error();
   return out;
 }
@@ -155,13 +156,15 @@ Result<ChannelProblem> make_channel_problem(const Dataset& dataset,
                          .source = {options.source, options.deposit},
                          .camera = *std::move(camera),
                          .illuminations = {},
-                         .data_count = 0};
+                         .data_count = 0,
+                         .noise = 0.0};
   for (const Illumination& illumination : dataset.illuminations) {
     if (!selected(illumination, selection)) continue;
     auto data = make_illumination(dataset, illumination, channel, options.model_error);
     if (!data) return data.error().in(fmt::format("illumination {}", illumination.name));
     problem.data_count += static_cast<std::size_t>(
         std::count_if(data->weight.begin(), data->weight.end(), [](double w) { return w > 0.0; }));
+    problem.noise += data->noise;
     problem.illuminations.push_back(*std::move(data));
   }
   if (selection == Selection::kFit) {

@@ -16,6 +16,7 @@ struct ChannelIllumination {
   std::vector<double> irradiance;  ///< q = (1 - R(0)) E on the lit face, transmitted, W/mm^2
   std::vector<double> radiance;    ///< L* on the seen face, W/(mm^2 sr)
   std::vector<double> weight;      ///< w of InverseOptions::model_error; 0 where masked
+  double noise = 0.0;              ///< sum of w times the measured variance
 };
 
 /// One colour channel of a dataset, as the objective reads it.
@@ -28,6 +29,7 @@ struct ChannelProblem {
   std::vector<diffusion::CameraEquation> camera;  ///< per cell of the seen face
   std::vector<ChannelIllumination> illuminations;
   std::size_t data_count = 0;  ///< data of weight > 0
+  double noise = 0.0;          ///< of all illuminations: the chi^2 that measured noise alone makes
 };
 
 /// Which illuminations of a dataset a problem takes.

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 constexpr std::size_t kLargestFile = std::size_t{4} << 30;
 static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
 
@@ -43,6 +43,7 @@ json to_json(const ChannelReport& r) {
           {"history", std::move(history)},
           {"stop_reason", static_cast<int>(r.stop_reason)},
           {"data_count", r.data_count},
+          {"noise_per_datum", r.noise_per_datum},
           {"solves", r.solves},
           {"seconds", r.seconds}};
 }
@@ -61,6 +62,7 @@ ChannelReport report_from(const json& j) {
   }
   r.stop_reason = static_cast<StopReason>(j.at("stop_reason").get<int>());
   r.data_count = j.at("data_count").get<std::size_t>();
+  r.noise_per_datum = j.at("noise_per_datum").get<double>();
   r.solves = j.at("solves").get<long>();
   r.seconds = j.at("seconds").get<double>();
   return r;

@@ -44,9 +44,9 @@ struct InverseOptions {
   Method method = Method::kLbfgs;
   int max_iterations = 150;  ///< per channel; 0 keeps the homogeneous fit
   double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
-  /// Discrepancy principle: stop once chi^2 <= discrepancy times the number of data; >= 0, 0 never stops so. 1 is
-  /// Morozov's; the default is lower because model_error counts generously, and the prior keeps the noise out.
-  double discrepancy = 0.5;
+  /// Discrepancy principle (Morozov 1966): stop once chi^2 <= discrepancy times what the measured noise alone makes of
+  /// it, sum w var; above 1, since model and grid have their errors too; >= 0, 0 never stops so.
+  double discrepancy = 2.0;
   double stalled =
       0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0
   CoefficientBounds absorption{1e-5, 10.0};

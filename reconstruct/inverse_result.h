@@ -40,7 +40,8 @@ struct ChannelReport {
   std::vector<IterationRecord> history;
   StopReason stop_reason = StopReason::kIterationLimit;
   std::size_t data_count = 0;
-  long solves = 0;  ///< for one right-hand side
+  double noise_per_datum = 0.0;  ///< chi^2 per datum that measured noise alone makes
+  long solves = 0;               ///< for one right-hand side
   double seconds = 0.0;
 };
 

@@ -25,8 +25,8 @@ struct InverseContext {
 /// (docs/physics.md):
 ///
 ///   per channel: homogeneous fit -> L-BFGS on Objective over p = (log sigma_s', log sigma_a),
-///   bounded, until chi^2 <= discrepancy times the number of data (Morozov 1966, with the measured
-///   variance), or no more is to be had
+///   bounded, until chi^2 is what the measured noise alone makes of it (Morozov 1966), or no more is
+///   to be had
 ///
 /// A cancelled or killed call goes on from its last checkpoint. After each checkpoint the solves
 /// start afresh, so a run that was interrupted gives the same bits as one that was not, on the same

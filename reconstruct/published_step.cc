@@ -95,7 +95,7 @@ Result<StepOutcome> published_step(LbfgsState& state,
   double best = 0.0;
   double least = state.at.value;
   const auto at = [&](double alpha) -> Result<double> {
-    const auto value = objective.value(logarithms_of(moved(raw, alpha, d), bounds), stop);
+    auto value = objective.value(logarithms_of(moved(raw, alpha, d), bounds), stop);
     if (value && *value < least) {
       least = *value;
       best = alpha;
