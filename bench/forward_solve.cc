@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -26,7 +27,6 @@ namespace opaline::bench {
 namespace {
 
 using reconstruct::diffusion::FieldBatch;
-using reconstruct::diffusion::FluenceSolver;
 using reconstruct::diffusion::SolveSummary;
 
 constexpr double kTolerance = 1e-6;
@@ -169,8 +169,8 @@ void compare_with_eigen(const ForwardCase& problem, const Timed& ours, int round
 Result<void> compare_with_relaxation(const ForwardCase& problem, int rounds) {
   const auto exact = time_host(problem, 1e-10, 1);
   if (!exact) return exact.error();
-  for (double tolerance = 1e-2; tolerance > 1e-9; tolerance *= 0.5) {
-    const auto ours = time_host(problem, tolerance, rounds);
+  for (int halvings = 0; halvings < 24; ++halvings) {
+    const auto ours = time_host(problem, std::ldexp(1e-2, -halvings), rounds);
     if (!ours) return ours.error();
     const double error = front_face_error(problem, ours->x, exact->x);
     if (error > kFrontFaceError) continue;

@@ -113,7 +113,7 @@ std::optional<double> parse_quantity(std::string_view text, Unit unit) {
 
 std::string format_quantity(double value, Unit unit) {
   if (unit == Unit::kTime && value > 0.0 && value < 1.0) {
-    if (const std::string text = format_short_time(std::round(value * 1e9)); !text.empty()) {
+    if (std::string text = format_short_time(std::round(value * 1e9)); !text.empty()) {
       return text;
     }
   }

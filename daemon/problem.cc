@@ -45,7 +45,6 @@ int http_status(ErrorCode code) {
     case ErrorCode::kNotFound:
       return 404;
     case ErrorCode::kBusy:
-      return 409;
     case ErrorCode::kCancelled:
       return 409;
     case ErrorCode::kUnavailable:

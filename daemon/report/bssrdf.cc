@@ -65,6 +65,7 @@ Result<ChannelErrors> bssrdf_error(const Material& material,
   ChannelErrors errors;
   for (int row = 0; row < responses.patches_y; ++row) {  // a row of patches at a time
     std::vector<render::Light> lights;
+    lights.reserve(static_cast<std::size_t>(responses.patches_x));
     for (int column = 0; column < responses.patches_x; ++column) {
       lights.push_back(light_on_patch(responses, column, row));
     }

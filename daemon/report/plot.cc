@@ -102,8 +102,8 @@ Layout layout_of(const MapPlot& plot) {
 /// Where panel `index` lies, as shares of the whole drawing.
 std::string placement(const MapPlot& plot, const Layout& layout, int index) {
   const double left = kLeft + index % plot.columns * (plot.panel_width + kGap);
-  const double bottom =
-      kBottom + (layout.rows - 1 - index / plot.columns) * (plot.panel_height + kTitle);
+  const int row = index / plot.columns;
+  const double bottom = kBottom + (layout.rows - 1 - row) * (plot.panel_height + kTitle);
   return fmt::format(
       "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\n"
       "set bmargin at screen {:.5f}\nset tmargin at screen {:.5f}\n",

@@ -19,7 +19,7 @@ class Hostile : public OpalinedTest {
 TEST_F(Hostile, AnswersWhatIsNotHttpAndGoesOn) {
   start();
   EXPECT_EQ(send("what is this\r\n\r\n").status, 400);
-  EXPECT_EQ(send(std::string("GET /\0 HTTP/1.1\r\n\r\n", 20)).status, 400);
+  EXPECT_EQ(send(std::string("GET /\0 HTTP/1.1\r\n\r\n", 19)).status, 400);
   EXPECT_EQ(send("GET %zz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").status, 400);
   EXPECT_EQ(
       send("POST /v1/sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n").status,

@@ -159,7 +159,7 @@ TEST(CombinedResponses, AverageRunsWithSeedsInSequence) {
   ASSERT_TRUE(three);
   EXPECT_EQ(three->seed, 4);
   EXPECT_EQ(three->passes, 3);
-  EXPECT_EQ(three->photons_per_patch, 3 * 8 * kBatchPhotons);
+  EXPECT_EQ(three->photons_per_patch, std::uint64_t{24} * kBatchPhotons);
   const auto at = [](const TransportResponses& r) { return r.patch(0, 0).radiance.at(1, 2, 1); };
   const auto variance = [](const TransportResponses& r) {
     return r.patch(0, 0).variance.at(1, 2, 1);
