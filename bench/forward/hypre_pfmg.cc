@@ -221,6 +221,7 @@ int run(const std::string& name, int rounds, double tolerance) {
   Hypre hypre(*problem, tolerance);
   hypre.run();  // the first one asks the system for memory
   std::vector<double> seconds;
+  seconds.reserve(static_cast<std::size_t>(rounds));
   for (int round = 0; round < rounds; ++round) seconds.push_back(hypre.run());
   const FieldBatch x = hypre.solution();
   int rank = 0;

@@ -19,8 +19,8 @@ using Corners = std::array<Eigen::Index, 8>;
 /// Two elements a cell along each axis.
 struct Mesh {
   Block cells;
-  int nx, ny, nz;     // elements
-  double hx, hy, hz;  // of an element, mm
+  int nx = 0, ny = 0, nz = 0;           // elements
+  double hx = 0.0, hy = 0.0, hz = 0.0;  // of an element, mm
   Eigen::Index node(int i, int j, int k) const {
     return (static_cast<Eigen::Index>(k) * (ny + 1) + j) * (nx + 1) + i;
   }
