@@ -39,7 +39,7 @@ TEST(Artefacts, AreNamedFromTheSessionsDirectoryAndSorted) {
   ASSERT_TRUE(session);
   fs::create_directories(session->path() / "hdr" / ".hidden");
   std::ofstream(session->path() / "hdr" / "a.exr") << "123";
-  std::ofstream(session->path() / "hdr" / ".hidden" / "b.exr");
+  std::ofstream(session->path() / "hdr" / ".hidden" / "b.exr") << "4";
 
   const auto artefacts = *list_artefacts(*session);
 

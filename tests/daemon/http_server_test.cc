@@ -38,7 +38,7 @@ class EndlessStream : public TextStream {
 
 class HttpServerTest : public ::testing::Test {
  protected:
-  ~HttpServerTest() override {
+  void TearDown() override {
     if (server_ != nullptr) server_->stop();
   }
   void serve() {
