@@ -101,9 +101,9 @@ void visit_reconstruction(Fields& fields, InverseOptions& r) {
   fields.number({"tolerance", "of every diffusion solve, relative residual"},
                 r.tolerance,
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
-  fields.number({"discrepancy", "stop at chi^2 <= this times what noise alone makes; 0: never"},
+  fields.number({"discrepancy", "stop at the chi^2 of the noise and this share of model_error"},
                 r.discrepancy,
-                Range::at_least(0));
+                Range::between(0, 1));
   fields.number({"stalled", "stop when ten iterations gain less than this fraction"},
                 r.stalled,
                 Range::at_least(0));

@@ -53,7 +53,9 @@ Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
   solves_before_ = fit->solves;
   ChannelProgress progress;
   progress.report.data_count = problem_.data_count;
-  progress.report.noise_per_datum = problem_.noise / static_cast<double>(problem_.data_count);
+  const double noise = problem_.noise / static_cast<double>(problem_.data_count);
+  progress.report.noise_per_datum = noise;
+  progress.report.target_per_datum = noise + options_.discrepancy * (1.0 - noise);
   const std::size_t cells = problem_.block.cell_count();
   progress.state.x.assign(cells, std::log(fit->reduced_scattering));
   progress.state.x.resize(2 * cells, std::log(fit->absorption));
@@ -69,8 +71,7 @@ Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
 std::optional<StopReason> ChannelSolver::reason_to_stop(const ChannelReport& report) const {
   const auto& history = report.history;
   const IterationRecord& now = history.back();
-  if (now.chi_squared_per_datum <= options_.discrepancy * report.noise_per_datum)
-    return StopReason::kDiscrepancy;
+  if (now.chi_squared_per_datum <= report.target_per_datum) return StopReason::kDiscrepancy;
   if (now.iteration >= options_.max_iterations) return StopReason::kIterationLimit;
   if (history.size() <= kStallWindow) return std::nullopt;
   const double gained = history[history.size() - 1 - kStallWindow].objective - now.objective;

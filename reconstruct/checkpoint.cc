@@ -44,6 +44,7 @@ json to_json(const ChannelReport& r) {
           {"stop_reason", static_cast<int>(r.stop_reason)},
           {"data_count", r.data_count},
           {"noise_per_datum", r.noise_per_datum},
+          {"target_per_datum", r.target_per_datum},
           {"solves", r.solves},
           {"seconds", r.seconds}};
 }
@@ -63,6 +64,7 @@ ChannelReport report_from(const json& j) {
   r.stop_reason = static_cast<StopReason>(j.at("stop_reason").get<int>());
   r.data_count = j.at("data_count").get<std::size_t>();
   r.noise_per_datum = j.at("noise_per_datum").get<double>();
+  r.target_per_datum = j.at("target_per_datum").get<double>();
   r.solves = j.at("solves").get<long>();
   r.seconds = j.at("seconds").get<double>();
   return r;

@@ -47,7 +47,8 @@ Result<void> validate(const InverseOptions& o) {
   if (o.max_iterations < 0) return expected("max_iterations", o.max_iterations, ">= 0");
   if (!(o.tolerance > 0.0 && o.tolerance < 1.0))
     return expected("tolerance", o.tolerance, "> 0 and < 1");
-  if (!not_negative(o.discrepancy)) return expected("discrepancy", o.discrepancy, ">= 0");
+  if (!(o.discrepancy >= 0.0 && o.discrepancy <= 1.0))
+    return expected("discrepancy", o.discrepancy, "0 to 1");
   if (!not_negative(o.stalled)) return expected("stalled", o.stalled, ">= 0");
   if (o.checkpoint_every < 1) return expected("checkpoint_every", o.checkpoint_every, ">= 1");
   if (o.threads < 0) return expected("threads", o.threads, ">= 0");

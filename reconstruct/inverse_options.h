@@ -44,9 +44,9 @@ struct InverseOptions {
   Method method = Method::kLbfgs;
   int max_iterations = 150;  ///< per channel; 0 keeps the homogeneous fit
   double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
-  /// Discrepancy principle (Morozov 1966): stop once chi^2 <= discrepancy times what the measured noise alone makes of
-  /// it, sum w var; above 1, since model and grid have their errors too; >= 0, 0 never stops so.
-  double discrepancy = 2.0;
+  /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy model_error^2 (...)), the measured
+  /// noise and this share of the model's error, which counts generously; 0 to 1.
+  double discrepancy = 0.1;
   double stalled =
       0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0
   CoefficientBounds absorption{1e-5, 10.0};

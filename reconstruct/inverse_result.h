@@ -40,8 +40,9 @@ struct ChannelReport {
   std::vector<IterationRecord> history;
   StopReason stop_reason = StopReason::kIterationLimit;
   std::size_t data_count = 0;
-  double noise_per_datum = 0.0;  ///< chi^2 per datum that measured noise alone makes
-  long solves = 0;               ///< for one right-hand side
+  double noise_per_datum = 0.0;   ///< chi^2 per datum that measured noise alone makes
+  double target_per_datum = 0.0;  ///< at which the pictures count as explained
+  long solves = 0;                ///< for one right-hand side
   double seconds = 0.0;
 };
 

@@ -114,7 +114,7 @@ class Reconstruction {
   double channel_fraction(const ChannelReport& report) const {
     if (report.history.empty()) return 0.0;
     const IterationRecord& now = report.history.back();
-    const double target = std::max(options_.discrepancy * report.noise_per_datum, 1e-3);
+    const double target = std::max(report.target_per_datum, 1e-3);
     const double whole = std::log(report.history.front().chi_squared_per_datum / target);
     const double left = std::log(now.chi_squared_per_datum / target);
     const double fallen = whole > 0.0 ? 1.0 - left / whole : 1.0;

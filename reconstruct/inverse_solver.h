@@ -25,7 +25,7 @@ struct InverseContext {
 /// (docs/physics.md):
 ///
 ///   per channel: homogeneous fit -> L-BFGS on Objective over p = (log sigma_s', log sigma_a),
-///   bounded, until chi^2 is what the measured noise alone makes of it (Morozov 1966), or no more is
+///   bounded, until chi^2 is what the measured noise makes of it (Morozov 1966, InverseOptions::discrepancy), or no more is
 ///   to be had
 ///
 /// A cancelled or killed call goes on from its last checkpoint. After each checkpoint the solves

@@ -55,6 +55,7 @@ Json to_json(const ChannelReport& r, const char* name) {
           {"stop_explanation", explain(r.stop_reason)},
           {"data", r.data_count},
           {"noise_chi_squared_per_datum", r.noise_per_datum},
+          {"target_chi_squared_per_datum", r.target_per_datum},
           {"solves", r.solves},
           {"seconds", r.seconds},
           {"chi_squared_per_datum", r.history.back().chi_squared_per_datum},

@@ -166,8 +166,8 @@ CurvePlot convergence_plot(const ReportData& data) {
       series.y.push_back(step.value("chi_squared_per_datum", 0.0));
     }
     plot.series.push_back(std::move(series));
-    plot.level += data.config.reconstruction.discrepancy / static_cast<double>(channels.size()) *
-                  channels[c].value("noise_chi_squared_per_datum", 0.0);
+    plot.level += channels[c].value("target_chi_squared_per_datum", 0.0) /
+                  static_cast<double>(channels.size());
   }
   plot.level_title = "stops here";
   return plot;

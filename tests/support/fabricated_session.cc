@@ -167,7 +167,7 @@ class Fabricator {
            {"history", history},
            {"chi_squared_per_datum", 1.05},
            {"data", 1000},
-           {"noise_chi_squared_per_datum", 1.0},
+           {"target_chi_squared_per_datum", 1.0},
            {"solves", 5000},
            {"seconds", 12.3},
            {"stop_reason", "discrepancy"},

@@ -79,7 +79,7 @@ void add_noise(const SyntheticOptions& options, std::mt19937& random, Illuminati
     float& l = i.radiance.samples()[s];
     const double sigma = options.noise * std::hypot(l, 0.1 * brightest);
     i.radiance_variance.samples()[s] = static_cast<float>(std::max(sigma * sigma, 1e-20));
-    l += static_cast<float>(std::normal_distribution<double>(0.0, sigma)(random));
+    if (sigma > 0.0) l += static_cast<float>(std::normal_distribution<double>(0.0, sigma)(random));
   }
 }
 
