@@ -22,10 +22,12 @@ target_compile_options(opaline_options INTERFACE -Wall -Wextra -Wpedantic -Wshad
   -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual -ffp-contract=off)
 if(OPALINE_WERROR)
   target_compile_options(opaline_options INTERFACE -Werror)
+else()  # at -O3 and in instrumented code g++ 12 sees ghosts
+  target_compile_options(opaline_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
 endif()
 if(OPALINE_SANITIZE)
   target_compile_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE}
-    -fno-omit-frame-pointer -fno-sanitize-recover=all -Wno-maybe-uninitialized)  # g++ 12 sees ghosts in instrumented code
+    -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE})
 endif()
 
