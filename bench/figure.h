@@ -15,4 +15,7 @@ void print_figure(std::string_view figure,
 /// The middle of at least one value; of an even number the upper of the two.
 double median(std::vector<double> values);
 
+/// What this program has held at most, MB.
+double peak_megabytes();
+
 }  // namespace opaline::bench

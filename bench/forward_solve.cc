@@ -3,7 +3,6 @@
 // Prints one JSON object a figure (bench/figure.h).
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -76,13 +75,6 @@ double bytes_counted(const ForwardCase& problem, int iterations) {
   constexpr double kReplacements = 3.0;
   return number *
          (iterations * (cycle + 6.0 + 3.0) + kReplacements * (2.0 + 2.0 + 2.0 + 2.0 + 2.0 + 1.0));
-}
-
-/// What the program has held at most, MB.
-double peak_megabytes() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
 struct Timed {

@@ -2,7 +2,6 @@
 // material that it finds relights under lights that it never saw. Prints one JSON object a figure (bench/figure.h).
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -191,12 +190,6 @@ Result<void> compare_with_published(const Case& which,
   print_figure("inverse.published_seconds", which.name, seconds, "s");  // solves x time of one
   print_figure("inverse.wall_ratio_vs_published", which.name, seconds / effort.seconds, "x");
   return ok();
-}
-
-double peak_megabytes() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
 Result<void> run(const Case& which,
