@@ -44,8 +44,8 @@ struct InverseOptions {
   Method method = Method::kLbfgs;
   int max_iterations = 150;  ///< per channel; 0 keeps the homogeneous fit
   double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
-  /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy model_error^2 (...)), the measured
-  /// noise and this share of the model's error, which counts generously; 0 to 1.
+  /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy (model_error hypot(L, l))^2), the
+  /// measured noise and this share of the model's error, which counts generously; 0 to 1.
   double discrepancy = 0.1;
   double stalled =
       0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0

@@ -23,7 +23,7 @@ struct PublishedObjective {
 ///
 /// `state` is an LbfgsState, so that all that surrounds it stays the same: x is (log sigma_s',
 /// log sigma_a), pairs holds {d', g'} in the raw parameters once there is a last direction.
-/// Errors: the objective's; the state is unchanged then.
+/// Errors: the objective's; x and the objective there are unchanged then.
 Result<StepOutcome> published_step(LbfgsState& state,
                                    const Bounds& bounds,
                                    const PublishedObjective& objective,
