@@ -14,23 +14,26 @@ constexpr std::size_t kStallWindow = 10;  // iterations over which progress is j
 
 ChannelSolver::ChannelSolver(const ChannelProblem& problem,
                              const InverseOptions& options,
+                             Parametrization parametrization,
                              diffusion::FluenceSolver& solver,
                              const Clock& clock,
                              Hooks hooks)
     : problem_(problem),
       options_(options),
+      parametrization_(std::move(parametrization)),
       solver_(solver),
       clock_(clock),
       hooks_(std::move(hooks)),
       objective_(problem, solver, {options.tolerance, options.regularization}) {}
 
 Bounds ChannelSolver::bounds() const {
-  const std::size_t cells = problem_.block.cell_count();
+  const std::size_t scattering = parametrization_.reduced_scattering().size();
+  const std::size_t all = parametrization_.size();
   Bounds b;
-  b.lower.assign(cells, std::log(options_.reduced_scattering.lowest));
-  b.upper.assign(cells, std::log(options_.reduced_scattering.highest));
-  b.lower.resize(2 * cells, std::log(options_.absorption.lowest));
-  b.upper.resize(2 * cells, std::log(options_.absorption.highest));
+  b.lower.assign(scattering, std::log(options_.reduced_scattering.lowest));
+  b.upper.assign(scattering, std::log(options_.reduced_scattering.highest));
+  b.lower.resize(all, std::log(options_.absorption.lowest));
+  b.upper.resize(all, std::log(options_.absorption.highest));
   return b;
 }
 
@@ -47,23 +50,36 @@ void ChannelSolver::record(ChannelProgress& progress) {
   hooks_.iterated(report);
 }
 
-Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
-  auto fit = fit_homogeneous(problem_, options_, solver_, stop);
+Result<Evaluation> ChannelSolver::evaluate(std::span<const double> x, std::stop_token stop) {
+  auto at = objective_.evaluate(parametrization_.expand(x), std::move(stop));
+  if (at) at->gradient = parametrization_.gather(at->gradient);
+  return at;
+}
+
+Result<ChannelSolver::WarmStart> ChannelSolver::homogeneous_start(std::stop_token stop) {
+  const auto fit = fit_homogeneous(problem_, options_, solver_, std::move(stop));
   if (!fit) return fit.error().in("homogeneous fit");
   solves_before_ = fit->solves;
+  const std::size_t cells = problem_.block.cell_count();
+  WarmStart warm{*fit, std::vector<double>(cells, std::log(fit->reduced_scattering))};
+  warm.cell_values.resize(2 * cells, std::log(fit->absorption));
+  return warm;
+}
+
+Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
+  auto warm = warm_ ? Result<WarmStart>(*warm_) : homogeneous_start(stop);
+  if (!warm) return warm.error();
   ChannelProgress progress;
   progress.report.data_count = problem_.data_count;
   const double noise = problem_.noise / static_cast<double>(problem_.data_count);
   progress.report.noise_per_datum = noise;
   progress.report.target_per_datum = noise + options_.discrepancy * (1.0 - noise);
-  const std::size_t cells = problem_.block.cell_count();
-  progress.state.x.assign(cells, std::log(fit->reduced_scattering));
-  progress.state.x.resize(2 * cells, std::log(fit->absorption));
-  auto at = objective_.evaluate(progress.state.x, stop);
+  progress.state.x = parametrization_.average(warm->cell_values);
+  auto at = evaluate(progress.state.x, stop);
   if (!at) return at.error();
   progress.state.at = *std::move(at);
-  fit->chi_squared = progress.state.at.chi_squared;
-  progress.report.homogeneous = *fit;
+  if (!warm_) warm->homogeneous.chi_squared = progress.state.at.chi_squared;
+  progress.report.homogeneous = warm->homogeneous;
   record(progress);
   return progress;
 }
@@ -82,16 +98,16 @@ std::optional<StopReason> ChannelSolver::reason_to_stop(const ChannelReport& rep
 Result<StepOutcome> ChannelSolver::step(LbfgsState& state,
                                         const Bounds& box,
                                         std::stop_token stop) {
-  const ObjectiveFunction evaluate = [this](std::span<const double> x, std::stop_token token) {
-    return objective_.evaluate(x, std::move(token));
+  const ObjectiveFunction objective = [this](std::span<const double> x, std::stop_token token) {
+    return evaluate(x, std::move(token));
   };
   if (options_.method == Method::kLbfgs) {
-    return lbfgs_step(state, box, {}, evaluate, std::move(stop));
+    return lbfgs_step(state, box, {}, objective, std::move(stop));
   }
   const auto value = [this](std::span<const double> x, std::stop_token token) {
-    return objective_.value(x, std::move(token));
+    return objective_.value(parametrization_.expand(x), std::move(token));
   };
-  return published_step(state, box, {evaluate, value}, std::move(stop));
+  return published_step(state, box, {objective, value}, std::move(stop));
 }
 
 Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {

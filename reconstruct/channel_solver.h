@@ -3,15 +3,19 @@
 #include <functional>
 #include <optional>
 #include <stop_token>
+#include <utility>
+#include <vector>
 
 #include "base/clock.h"
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/parametrization.h"
 
 namespace opaline::reconstruct {
 
-/// The minimisation of one channel, from the homogeneous fit or from where it stopped.
+/// The minimisation of one channel over the parameters a of a Parametrization, J(P a) with the gradient P^T dJ/dp, from
+/// the homogeneous fit, from a simpler model's answer, or from where it stopped. LbfgsState::x holds a.
 class ChannelSolver {
  public:
   struct Hooks {
@@ -19,17 +23,27 @@ class ChannelSolver {
     std::function<Result<void>(const ChannelProgress&)>
         checkpoint;  ///< every options.checkpoint_every iterations
   };
+  /// A simpler model's answer.
+  struct WarmStart {
+    HomogeneousFit homogeneous;
+    std::vector<double> cell_values;  ///< (log sigma_s', log sigma_a), as Objective takes them
+  };
   ChannelSolver(const ChannelProblem& problem,
                 const InverseOptions& options,
+                Parametrization parametrization,
                 diffusion::FluenceSolver& solver,
                 const Clock& clock,
                 Hooks hooks);
 
+  /// What run() begins with instead of a homogeneous fit of its own.
+  void start_from(WarmStart warm) { warm_ = std::move(warm); }
   /// Runs to the end. Errors: kCancelled, the objective's, the checkpoint hook's.
   Result<ChannelProgress> run(std::optional<ChannelProgress> from, std::stop_token stop);
 
  private:
   Result<ChannelProgress> begin(std::stop_token stop);
+  Result<WarmStart> homogeneous_start(std::stop_token stop);
+  Result<Evaluation> evaluate(std::span<const double> x, std::stop_token stop);
   Result<StepOutcome> step(LbfgsState& state, const Bounds& box, std::stop_token stop);
   Result<void> iterate(ChannelProgress& progress, std::stop_token stop);
   void record(ChannelProgress& progress);
@@ -38,10 +52,12 @@ class ChannelSolver {
 
   const ChannelProblem& problem_;
   const InverseOptions& options_;
+  Parametrization parametrization_;
   diffusion::FluenceSolver& solver_;
   const Clock& clock_;
   Hooks hooks_;
   Objective objective_;
+  std::optional<WarmStart> warm_;
   long solves_before_ = 0;  // of the homogeneous fit and earlier runs of this channel
   double seconds_before_ = 0.0;
   std::chrono::nanoseconds start_{};

@@ -68,8 +68,10 @@ class Reconstruction {
         make_channel_problem(dataset_, static_cast<int>(channel), options_, Selection::kFit);
     if (!problem) return problem.error();
     report_progress(channel, {});
+    const auto parametrization = Parametrization::full(dataset_.block);
     ChannelSolver solver(*problem,
                          options_,
+                         parametrization,
                          context_.solver,
                          context_.clock,
                          {[&](const ChannelReport& report) { report_progress(channel, report); },
@@ -83,7 +85,8 @@ class Reconstruction {
               report.history.back().chi_squared_per_datum,
               to_string(report.stop_reason),
               report.seconds);
-    checkpoint_.finished[channel] = {to_coefficients(progress->state.x), report};
+    checkpoint_.finished[channel] = {to_coefficients(parametrization.expand(progress->state.x)),
+                                     report};
     if (auto saved = save(); !saved) return saved;
     return context_.events.fact(
         "channel.reconstructed",
