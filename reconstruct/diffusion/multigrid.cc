@@ -8,6 +8,7 @@ namespace opaline::reconstruct::diffusion {
 namespace {
 
 constexpr double kCoarsenBelow = 1.7;  // times the shortest cell edge
+constexpr double kOvercorrection = 1.1;
 
 /// What a level is made of besides its matrix: needed only to build the next one.
 struct Parts {
@@ -240,6 +241,17 @@ void bound_weights(Level& level) {
     for (std::size_t c = 0; c < weights.size(); ++c) weights[c] /= std::max(1.0, sum[c]);
 }
 
+void divide(std::vector<double>& values, double by) {
+  for (double& value : values) value /= by;
+}
+
+void soften(Level& level, Parts& parts) {
+  for (auto& g : level.conductance) divide(g, kOvercorrection);
+  divide(parts.sink, kOvercorrection);
+  for (auto& walls : parts.wall)
+    for (auto& side : walls) divide(side, kOvercorrection);
+}
+
 std::pair<Level, Parts> coarsen(Level& fine, const Parts& from) {
   std::pair<Level, Parts> made;
   auto& [coarse, parts] = made;
@@ -251,6 +263,7 @@ std::pair<Level, Parts> coarsen(Level& fine, const Parts& from) {
   add_to_parents(fine, coarse, from.sink, parts.sink.data());
   for (int axis = 0; axis < 3; ++axis) coarsen_axis(fine, from, axis, coarse, parts);
   bound_weights(fine);
+  soften(coarse, parts);
   sum_diagonal(coarse, parts);
   return made;
 }
