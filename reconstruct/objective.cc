@@ -6,9 +6,6 @@
 #include <cmath>
 
 #include "base/ensure.h"
-#include "reconstruct/diffusion/medium.h"
-#include "reconstruct/diffusion/source.h"
-#include "reconstruct/gradient.h"
 
 namespace opaline::reconstruct {
 
@@ -19,10 +16,6 @@ namespace {
 
 constexpr double kUselessResidual =
     1e-3;  // a solve that stays above this says nothing about the medium
-
-std::span<const double> field(const FieldBatch& batch, std::size_t m) {
-  return {batch.field(static_cast<int>(m)), batch.cells};
-}
 
 std::vector<double> logarithms(const std::vector<double>& values) {
   std::vector<double> logs(values.size());
@@ -82,38 +75,14 @@ Result<void> Objective::solve(const FieldBatch& b, FieldBatch& x, std::stop_toke
 
 Result<void> Objective::solve_forward(const ChannelCoefficients& coefficients,
                                       std::stop_token stop) {
-  medium_ = diffusion::make_medium(problem_.block, coefficients, problem_.boundary);
-  if (auto prepared = solver_.prepare(medium_); !prepared) return prepared;
-  surface_.clear();
-  const auto& light =
-      light_.emplace(medium_, problem_.boundary, problem_.lit_face, problem_.source);
-  FieldBatch b(fluence_.cells, fluence_.count);
-  for (int m = 0; m < b.count; ++m) {
-    const auto& q = problem_.illuminations[static_cast<std::size_t>(m)].irradiance;
-    light.deposit(q, {b.field(m), b.cells});
-    surface_.push_back(light.surface_terms(q));
-  }
+  lit_.emplace(problem_, coefficients);
+  if (auto prepared = solver_.prepare(lit_->medium); !prepared) return prepared;
+  const FieldBatch b = lit_->right_sides(problem_);
   return solve(b, fluence_, stop);
 }
 
 // Fills radiance_ from the fluence.
-void Objective::observe() {
-  const bool lit = problem_.seen_face == problem_.lit_face;
-  std::vector<double> flux(problem_.camera.size());
-  radiance_.resize(problem_.illuminations.size());
-  for (std::size_t m = 0; m < radiance_.size(); ++m) {
-    const auto source =
-        lit ? std::span<const double>(surface_[m].source) : std::span<const double>();
-    const auto escape =
-        lit ? std::span<const double>(surface_[m].escape) : std::span<const double>();
-    diffusion::net_flux(
-        medium_, problem_.boundary, problem_.seen_face, field(fluence_, m), source, escape, flux);
-    radiance_[m].resize(flux.size());
-    for (std::size_t x = 0; x < flux.size(); ++x) {
-      radiance_[m][x] = problem_.camera[x].radiance(lit ? source[x] : 0.0, flux[x]);
-    }
-  }
-}
+void Objective::observe() { radiance_ = radiance(problem_, *lit_, fluence_); }
 
 // Fills flux_residual_ with r = w (L - L*) dL/dJ_n; returns chi-squared.
 double Objective::residuals() {
@@ -131,71 +100,26 @@ double Objective::residuals() {
   return chi_squared;
 }
 
-// K psi = sum_f r_f g_b e_i(f); K is its own adjoint.
 Result<void> Objective::solve_adjoint(std::stop_token stop) {
-  const Block& block = problem_.block;
-  const Face face = problem_.seen_face;
-  const double h = block.spacing()[axis_of(face)];
-  FieldBatch b(adjoint_.cells, adjoint_.count);
-  for (int m = 0; m < b.count; ++m) {
-    std::size_t f = 0;
-    for (int row = 0; row < block.face_height(face); ++row) {
-      for (int column = 0; column < block.face_width(face); ++column, ++f) {
-        const std::size_t cell = block.cell_behind(face, column, row);
-        b.field(m)[cell] = flux_residual_[static_cast<std::size_t>(m)][f] *
-                           problem_.boundary.conductance(h, medium_.diffusion[cell]);
-      }
-    }
-  }
-  return solve(b, adjoint_, stop);
+  return solve(adjoint_right_sides(problem_, lit_->medium, flux_residual_), adjoint_, stop);
 }
 
 void Objective::regularize(const ChannelCoefficients& c,
                            Evaluation& out,
                            MediumGradient& logs) const {
-  out.regularization = regularizer_.add(logarithms(medium_.diffusion), logs.diffusion) +
+  out.regularization = regularizer_.add(logarithms(lit_->medium.diffusion), logs.diffusion) +
                        regularizer_.add(logarithms(c.absorption), logs.absorption);
   out.value += out.regularization;
 }
 
-// d/dlog sigma_s' = -(sigma_s' / sigma_t') d/dlog kappa,
-// d/dlog sigma_a  = d/dlog sigma_a at fixed kappa - (sigma_a / sigma_t') d/dlog kappa
 void Objective::add_gradient(const ChannelCoefficients& c, Evaluation& out) const {
-  const std::size_t cells = problem_.block.cell_count();
-  MatrixGradient matrix(problem_.block);
-  MediumGradient gradient(cells);
-  for (std::size_t m = 0; m < problem_.illuminations.size(); ++m) {
-    const auto phi = field(fluence_, m);
-    const auto psi = field(adjoint_, m);
-    matrix.gather(phi, psi);
-    for (const Face face : kFaces) {
-      using Values = std::span<const double>;
-      matrix.gather_face(face,
-                         phi,
-                         psi,
-                         face == problem_.lit_face ? Values(surface_[m].source) : Values(),
-                         face == problem_.seen_face ? Values(flux_residual_[m]) : Values());
-    }
-    const bool lit = problem_.seen_face == problem_.lit_face;
-    light_->add_gradient(
-        problem_.illuminations[m].irradiance,
-        psi,
-        lit ? std::span<const double>(flux_residual_[m]) : std::span<const double>(),
-        gradient);
-  }
-  matrix.add_to(medium_, problem_.boundary, gradient);
-  for (std::size_t i = 0; i < cells; ++i) {
-    gradient.diffusion[i] *= medium_.diffusion[i];
+  MediumGradient gradient = medium_gradient(problem_, *lit_, fluence_, adjoint_, flux_residual_);
+  for (std::size_t i = 0; i < problem_.block.cell_count(); ++i) {
+    gradient.diffusion[i] *= lit_->medium.diffusion[i];
     gradient.absorption[i] *= c.absorption[i];
   }
   regularize(c, out, gradient);
-  out.gradient.resize(2 * cells);
-  for (std::size_t i = 0; i < cells; ++i) {
-    const double mean_free_path = 3.0 * medium_.diffusion[i];
-    out.gradient[i] = -c.reduced_scattering[i] * mean_free_path * gradient.diffusion[i];
-    out.gradient[cells + i] =
-        gradient.absorption[i] - c.absorption[i] * mean_free_path * gradient.diffusion[i];
-  }
+  out.gradient = to_parameter_gradient(c, gradient);
 }
 
 Result<Evaluation> Objective::evaluate(std::span<const double> p, std::stop_token stop) {

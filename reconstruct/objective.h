@@ -7,9 +7,9 @@
 
 #include "base/material.h"
 #include "base/result.h"
+#include "reconstruct/adjoint.h"
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/diffusion/fluence_solver.h"
-#include "reconstruct/diffusion/source.h"
 #include "reconstruct/evaluation.h"
 #include "reconstruct/regularizer.h"
 
@@ -67,13 +67,11 @@ class Objective {
   Regularizer regularizer_;
   long solves_ = 0;
 
-  diffusion::Medium medium_;
-  std::optional<diffusion::FaceSource> light_;    // of the medium, once there is one
-  std::vector<diffusion::SurfaceTerms> surface_;  // per illumination
+  std::optional<LitMedium> lit_;  // the last one solved for
   diffusion::FieldBatch fluence_;
   diffusion::FieldBatch adjoint_;
-  std::vector<std::vector<double>> radiance_;       // per illumination
-  std::vector<std::vector<double>> flux_residual_;  // r = dJ/dJ_n, per illumination
+  std::vector<std::vector<double>> radiance_;  // per illumination
+  FluxResiduals flux_residual_;
 };
 
 /// (log sigma_s', log sigma_a), all sigma_s' first, and back.

@@ -78,6 +78,13 @@ double FaceSource::first_escape(const RayCell& first) const {
   return boundary_.conductance(h_, first.kappa) * first.beta * h_ / first.kappa;
 }
 
+double FaceSource::first_escape_slope(const RayCell& r) const {
+  const double gb = boundary_.conductance(h_, r.kappa);
+  const double dt = h_ / (3.0 * r.kappa * r.kappa);  // -dt/dkappa
+  return (h_ / r.kappa) * (gb * gb * h_ * r.beta / (2.0 * r.kappa * r.kappa) -
+                           gb * r.beta_slope * dt - gb * r.beta / r.kappa);
+}
+
 void FaceSource::deposit(std::span<const double> q, std::span<double> b) const {
   ENSURE(q.size() * depth_ == rays_.size() && b.size() == rays_.size());
   for (std::size_t f = 0; f < q.size(); ++f) {
@@ -156,14 +163,51 @@ void FaceSource::add_gradient(std::span<const double> q,
       if (n > 0) {
         d_kappa += share * (psi[r.cell] - psi[ray[n - 1].cell]) * r.beta_slope * dt;
       } else {
-        const double gb = boundary_.conductance(h_, r.kappa);
-        d_kappa += share * (rim - psi[r.cell]) * (h_ / r.kappa) *
-                   (gb * gb * h_ * r.beta / (2.0 * r.kappa * r.kappa) - gb * r.beta_slope * dt -
-                    gb * r.beta / r.kappa);
+        d_kappa += share * (rim - psi[r.cell]) * first_escape_slope(r);
       }
       gradient.diffusion[r.cell] += d_kappa;
       gradient.absorption[r.cell] += -3.0 * r.kappa * power * r.deposited * lambda;
       beyond += lambda * share;
+    }
+  }
+}
+
+void FaceSource::add_tangent(std::span<const double> q,
+                             const MediumChange& change,
+                             std::span<double> b,
+                             std::span<double> escape) const {
+  ENSURE(q.size() * depth_ == rays_.size() && escape.size() == q.size());
+  for (std::size_t f = 0; f < q.size(); ++f) {
+    const auto ray = column(f);
+    const double power = area_ * q[f];
+    if (power == 0.0) continue;
+    if (options_.model == SourceModel::kSurface) {
+      const double kappa = ray[0].kappa;
+      const double gb = boundary_.conductance(h_, kappa);
+      b[ray[0].cell] += gb * gb * h_ / (2.0 * kappa * kappa) * change.diffusion[ray[0].cell] *
+                        boundary_.source_scale * power;
+      continue;
+    }
+    double d_arriving = 0.0;  // dE_(n-1)
+    for (std::size_t n = 0; n < depth_; ++n) {
+      const RayCell& r = ray[n];
+      const double d_kappa = change.diffusion[r.cell];
+      const double d_t = -h_ / (3.0 * r.kappa * r.kappa) * d_kappa;
+      const double through = std::exp(-h_ / (3.0 * r.kappa));
+      const double d_remaining = through * d_arriving - r.remaining * d_t;
+      const double d_albedo = -3.0 * (r.absorption * d_kappa + r.kappa * change.absorption[r.cell]);
+      const double share = power * r.albedo * r.deposited;
+      const double d_share =
+          power * (d_albedo * r.deposited + r.albedo * (d_arriving - d_remaining));
+      const double out = n == 0 ? first_escape(r) : r.beta;
+      const double d_out = n == 0 ? first_escape_slope(r) * d_kappa : r.beta_slope * d_t;
+      b[r.cell] += d_share * (1.0 - out) - share * d_out;
+      if (n == 0) {
+        escape[f] += (d_share * out + share * d_out) / area_;
+      } else {
+        b[ray[n - 1].cell] += d_share * out + share * d_out;
+      }
+      d_arriving = d_remaining;
     }
   }
 }

@@ -40,6 +40,12 @@ struct MediumGradient {
   explicit MediumGradient(std::size_t cells) : diffusion(cells, 0.0), absorption(cells, 0.0) {}
 };
 
+/// A small change of a medium, one value a cell.
+struct MediumChange {
+  std::vector<double> diffusion;   ///< dkappa, mm
+  std::vector<double> absorption;  ///< dsigma_a, 1/mm
+};
+
 /// What enters the surface equations of the lit face, one value a cell of that face:
 ///   J_n = g_b (phi - S) + X,    M = q + J_n with the surface source, M = J_n with the collimated
 ///   one.
@@ -85,6 +91,13 @@ class FaceSource {
                     std::span<const double> flux_residual,
                     MediumGradient& gradient) const;
 
+  /// The same derivatives forwards: adds db/dmedium . change to `b`, dX/dmedium . change to `escape`
+  /// (one value a cell of the face). The surface source's b changes with g_b.
+  void add_tangent(std::span<const double> q,
+                   const MediumChange& change,
+                   std::span<double> b,
+                   std::span<double> escape) const;
+
  private:
   struct RayCell {  // one cell of one column, for a ray of unit power
     std::size_t cell = 0;
@@ -100,7 +113,8 @@ class FaceSource {
     return std::span(rays_).subspan(face_cell * depth_, depth_);
   }
   RayCell ray_cell(const Medium& medium, std::size_t cell, double arriving) const;
-  double first_escape(const RayCell& first) const;  // e
+  double first_escape(const RayCell& first) const;        // e
+  double first_escape_slope(const RayCell& first) const;  // de/dkappa
   double adjoint_weight(std::span<const RayCell> ray,
                         std::size_t n,
                         std::span<const double> psi,

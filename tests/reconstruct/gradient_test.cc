@@ -2,66 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "reconstruct/objective.h"
+#include "tests/reconstruct/support/random_problem.h"
 #include "tests/support/direct_solver.h"
 
 namespace opaline::reconstruct {
 namespace {
 
-struct Case {
-  const char* name;
-  diffusion::SourceModel source;
-  diffusion::Deposit deposit;
-  Face lit;
-  Face seen;
-  double regularization;
-};
-
-std::string case_name(const testing::TestParamInfo<Case>& info) { return info.param.name; }
-
-ChannelCoefficients random_medium(std::size_t cells, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> scattering(0.5, 4.0);
-  std::uniform_real_distribution<double> absorption(0.005, 0.2);
-  ChannelCoefficients c;
-  for (std::size_t i = 0; i < cells; ++i) {
-    c.reduced_scattering.push_back(scattering(random));
-    c.absorption.push_back(absorption(random));
-  }
-  return c;
-}
-
-// Two illuminations of a 6 x 5 x 4 block of anisotropic cells, seen obliquely, with random data,
-// weights and mask.
-ChannelProblem random_problem(const Case& c) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> uniform(0.2, 1.0);
-  ChannelProblem problem{
-      .block = {6, 5, 4, 0.5, 0.6, 0.4},
-      .lit_face = c.lit,
-      .seen_face = c.seen,
-      .boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, 1.3),
-      .source = {c.source, c.deposit},
-      .camera = {},
-      .illuminations = std::vector<ChannelIllumination>(2),
-      .data_count = 0};
-  const std::size_t seen = problem.block.face_cell_count(c.seen);
-  for (std::size_t x = 0; x < seen; ++x) {
-    problem.camera.push_back(diffusion::camera_equation(1.3, problem.boundary, uniform(random)));
-  }
-  for (ChannelIllumination& i : problem.illuminations) {
-    for (std::size_t x = 0; x < problem.block.face_cell_count(c.lit); ++x) {
-      i.irradiance.push_back(uniform(random) > 0.5 ? uniform(random) : 0.0);
-    }
-    for (std::size_t x = 0; x < seen; ++x) {
-      i.radiance.push_back(0.02 * uniform(random));
-      i.weight.push_back(uniform(random) > 0.3 ? 1e3 * uniform(random) : 0.0);
-    }
-  }
-  return problem;
-}
+using namespace testing_problem;  // NOLINT(google-build-using-namespace)
 
 class Gradient : public testing::TestWithParam<Case> {
  protected:
@@ -105,23 +54,7 @@ TEST_P(Gradient, MatchesRichardsonDifferencesInEveryParameter) {
   EXPECT_LE(unresolved, p.size() / 50);
 }
 
-constexpr auto kCollimated = diffusion::SourceModel::kCollimated;
-constexpr auto kSurface = diffusion::SourceModel::kSurface;
-constexpr auto kCentroid = diffusion::Deposit::kCentroid;
-constexpr auto kCell = diffusion::Deposit::kCell;
-
-INSTANTIATE_TEST_SUITE_P(
-    Light,
-    Gradient,
-    testing::Values(Case{"BackLitCentroid", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"BackLitCell", kCollimated, kCell, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"BackLitSurface", kSurface, kCentroid, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"FrontLitCentroid", kCollimated, kCentroid, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FrontLitCell", kCollimated, kCell, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FrontLitSurface", kSurface, kCentroid, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FromTheSide", kCollimated, kCentroid, Face::kXMax, Face::kYMin, 0.0},
-                    Case{"Regularized", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 2.0}),
-    case_name);
+INSTANTIATE_TEST_SUITE_P(Light, Gradient, kEveryLight, case_name);
 
 }  // namespace
 }  // namespace opaline::reconstruct
