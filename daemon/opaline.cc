@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <functional>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/run.h"
 #include "daemon/executor.h"
+#include "daemon/jobs/program.h"
 #include "daemon/jobs/version.h"
 #include "daemon/json_text.h"
 #include "daemon/runtime_paths.h"
@@ -28,14 +28,7 @@ namespace {
 using namespace opaline;          // NOLINT(google-build-using-namespace)
 using namespace opaline::daemon;  // NOLINT(google-build-using-namespace)
 
-enum Exit : int {
-  kDone = 0,
-  kFailed = 1,
-  kBadInput = 2,
-  kCancelledByUser = 3,
-  kBusyNow = 4,
-  kLeft = 5,  // no longer followed, and not over
-};
+constexpr int kLeft = 5;  // no longer followed, and not over; beside those of ProgramExit
 
 struct Arguments {
   DaemonAddress daemon;
@@ -51,17 +44,7 @@ struct Arguments {
 
 int report(const Error& error) {
   fmt::print(stderr, "opaline: {}\n", error.message);
-  switch (error.code) {
-    case ErrorCode::kInvalidArgument:
-    case ErrorCode::kNotFound:
-      return kBadInput;
-    case ErrorCode::kCancelled:
-      return kCancelledByUser;
-    case ErrorCode::kBusy:
-      return kBusyNow;
-    default:
-      return kFailed;
-  }
+  return status_of(Result<void>(error));
 }
 
 bool is_over_named(const std::string& state) {
@@ -79,9 +62,10 @@ int report(const Result<Ending>& ending, const std::string& go_on) {
   std::error_code none;
   fmt::print("session  {}\n", ending->directory.string());
   if (std::filesystem::exists(page, none)) fmt::print("report   {}\n", page.string());
-  if (ending->state == "succeeded") return kDone;
+  if (ending->state == "succeeded") return status_of(ProgramExit::kDone);
   fmt::print("{}{}{}\n", ending->state, ending->message.empty() ? "" : ": ", ending->message);
-  return ending->state == "cancelled" ? kCancelledByUser : kFailed;
+  return ending->state == "cancelled" ? status_of(ProgramExit::kCancelled)
+                                      : status_of(ProgramExit::kFailed);
 }
 
 int follow(const Arguments& arguments, const std::string& id, OnInterrupt on_interrupt) {
@@ -133,7 +117,7 @@ int resume_local(const Arguments& arguments) {
 }
 
 int check(const Arguments& arguments) {
-  int status = kDone;
+  int status = status_of(ProgramExit::kDone);
   for (const std::filesystem::path& file : arguments.files) {
     const auto problems = config::check(file);
     if (!problems) {
@@ -142,7 +126,7 @@ int check(const Arguments& arguments) {
       fmt::print("{}: no problems\n", file.string());
     } else {
       fmt::print(stderr, "{}\n", config::to_string(*problems));
-      status = kBadInput;
+      status = status_of(ProgramExit::kBadInput);
     }
   }
   return status;
@@ -177,7 +161,7 @@ int status(const Arguments& arguments) {
     const std::string state = text_of(session, "state");
     if (is_over_named(state)) fmt::print("{}  {}\n", text_of(session, "id"), state);
   }
-  return kDone;
+  return status_of(ProgramExit::kDone);
 }
 
 int post(const Arguments& arguments, const std::string& what) {
@@ -185,7 +169,7 @@ int post(const Arguments& arguments, const std::string& what) {
                           .post(fmt::format("/v1/sessions/{}/{}", arguments.id, what), {});
   if (!answer) return report(answer.error());
   fmt::print("{}  {}\n", arguments.id, text_of(*answer, "state"));
-  return kDone;
+  return status_of(ProgramExit::kDone);
 }
 
 // What a subcommand does, after what each of them needs first.
@@ -293,28 +277,21 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   declare_deeds(app, arguments, status_code);
 }
 
-int run_program(int argc, char** argv) {
+int program(int argc, char** argv) {
   CLI::App app;
   Arguments arguments;
-  int status_code = kDone;
+  int status_code = status_of(ProgramExit::kDone);
   log::set_level(log::Level::kWarning);  // what happens is shown by the progress
   if (const auto socket = default_socket()) arguments.daemon.socket = *socket;
   declare(app, arguments, status_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kDone : kBadInput;
+    return app.exit(e) == 0 ? status_of(ProgramExit::kDone) : status_of(ProgramExit::kBadInput);
   }
   return status_code;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    return run_program(argc, argv);
-  } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
-    return kFailed;
-  }
-}
+int main(int argc, char** argv) { return opaline::daemon::run_program(argc, argv, program); }

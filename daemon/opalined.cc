@@ -4,12 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <string>
 
 #include "base/log.h"
 #include "daemon/executor.h"
 #include "daemon/http_server.h"
+#include "daemon/jobs/program.h"
 #include "daemon/jobs/version.h"
 #include "daemon/routes/artefacts.h"
 #include "daemon/routes/events.h"
@@ -102,18 +102,7 @@ Result<void> serve(Arguments& arguments) {
   return ok();
 }
 
-int exit_status(const Error& error) {
-  switch (error.code) {
-    case ErrorCode::kInvalidArgument:
-      return 2;
-    case ErrorCode::kBusy:
-      return 4;
-    default:
-      return 1;
-  }
-}
-
-int run_program(int argc, char** argv) {
+int program(int argc, char** argv) {
   CLI::App app;
   Arguments arguments;
   declare(app, arguments);
@@ -125,16 +114,9 @@ int run_program(int argc, char** argv) {
   const Result<void> served = serve(arguments);
   if (served) return 0;
   log::critical("opalined: {}", served.error().message);
-  return exit_status(served.error());
+  return status_of(served);
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    return run_program(argc, argv);
-  } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return opaline::daemon::run_program(argc, argv, program); }

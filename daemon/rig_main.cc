@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -11,6 +10,7 @@
 #include "base/files.h"
 #include "base/log.h"
 #include "config/session_config.h"
+#include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
 #include "daemon/simulated_rig.h"
@@ -182,21 +182,7 @@ Result<void> run(const CLI::App& app, const Arguments& arguments) {
   return sim::RigClient(arguments.socket).end();
 }
 
-int exit_code(opaline::ErrorCode code) {
-  switch (code) {
-    case opaline::ErrorCode::kInvalidArgument:
-    case opaline::ErrorCode::kNotFound:
-      return 2;
-    case opaline::ErrorCode::kCancelled:
-      return 3;
-    case opaline::ErrorCode::kBusy:
-      return 4;
-    default:
-      return 1;
-  }
-}
-
-int run_program(int argc, char** argv) {
+int program(int argc, char** argv) {
   CLI::App app("The simulated station as a process of its own.");
   Arguments arguments;
   add_serve(app, arguments);
@@ -217,16 +203,9 @@ int run_program(int argc, char** argv) {
   const auto done = run(app, arguments);
   if (done) return 0;
   opaline::log::error("{}", done.error().message);
-  return exit_code(done.error().code);
+  return opaline::daemon::status_of(done);
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    return run_program(argc, argv);
-  } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return opaline::daemon::run_program(argc, argv, program); }

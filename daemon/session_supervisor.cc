@@ -6,12 +6,13 @@
 #include "base/lock.h"
 #include "base/log.h"
 #include "daemon/cancel_wish.h"
+#include "daemon/jobs/program.h"
 
 namespace opaline::daemon {
 namespace {
 
 constexpr std::chrono::seconds kRetryBusyAfter{1};
-constexpr int kExitBusy = 4;  // JobExit::kBusy
+constexpr int kExitBusy = status_of(ProgramExit::kBusy);
 
 }  // namespace
 

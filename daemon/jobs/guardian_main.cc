@@ -1,11 +1,11 @@
 #include <cstdio>
-#include <exception>
 #include <string_view>
 
 #include "base/log.h"
 #include "base/session_directory.h"
 #include "config/session_config.h"
 #include "daemon/jobs/guardian.h"
+#include "daemon/jobs/program.h"
 #include "daemon/light_switch.h"
 
 // opaline-guardian SESSION_DIR: started by opaline-capture, never by hand. Makes the session's light source dark when
@@ -13,7 +13,7 @@
 
 namespace {
 
-int run_program(int argc, char** argv) {
+int program(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]).starts_with('-')) {
     std::fputs("Usage: opaline-guardian SESSION_DIR (opaline-capture starts it)\n", stderr);
     return 2;
@@ -34,11 +34,4 @@ int run_program(int argc, char** argv) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    return run_program(argc, argv);
-  } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return opaline::daemon::run_program(argc, argv, program); }

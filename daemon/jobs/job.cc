@@ -16,28 +16,12 @@
 #include "base/log.h"
 #include "daemon/jobs/control_server.h"
 #include "daemon/jobs/job_events.h"
+#include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
 
 namespace opaline::daemon {
 namespace {
-
-int status_of(JobExit exit) { return static_cast<int>(exit); }
-
-JobExit exit_of(const Result<void>& result) {
-  if (result) return JobExit::kDone;
-  switch (result.error().code) {
-    case ErrorCode::kInvalidArgument:
-    case ErrorCode::kNotFound:
-      return JobExit::kBadInput;
-    case ErrorCode::kCancelled:
-      return JobExit::kCancelled;
-    case ErrorCode::kBusy:
-      return JobExit::kBusy;
-    default:
-      return JobExit::kFailed;
-  }
-}
 
 void print_help(const JobDescription& job) {
   fmt::print(
@@ -62,15 +46,15 @@ Arguments parse_arguments(int argc, char** argv, const JobDescription& job) {
   const std::string_view first = argc > 1 ? argv[1] : "";
   if (first == "--help" || first == "-h") {
     print_help(job);
-    return {status_of(JobExit::kDone), {}};
+    return {status_of(ProgramExit::kDone), {}};
   }
   if (first == "--version") {
     fmt::print("opaline-{} {}\n", job.name, version());
-    return {status_of(JobExit::kDone), {}};
+    return {status_of(ProgramExit::kDone), {}};
   }
   if (argc != 2 || first.empty() || first.starts_with('-')) {
     fmt::print(stderr, "Usage: opaline-{0} SESSION_DIR (see opaline-{0} --help)\n", job.name);
-    return {status_of(JobExit::kBadInput), {}};
+    return {status_of(ProgramExit::kBadInput), {}};
   }
   return {std::nullopt, std::string(first)};
 }
@@ -185,7 +169,7 @@ int run_job(int argc, char** argv, const JobDescription& job, const JobBody& bod
   if (arguments.exit) return *arguments.exit;
   const Result<void> result = run_on(arguments.directory, job, body);
   if (!result) log::error("opaline-{}: {}", job.name, result.error().message);
-  return status_of(exit_of(result));
+  return status_of(result);
 }
 
 }  // namespace opaline::daemon

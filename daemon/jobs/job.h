@@ -27,9 +27,6 @@ struct JobContext {
 
 using JobBody = std::function<Result<void>(JobContext&)>;
 
-/// How a job's process ends, for whoever started it.
-enum class JobExit : int { kDone = 0, kFailed = 1, kBadInput = 2, kCancelled = 3, kBusy = 4 };
-
 /// The main of every job: `opaline-STAGE SESSION_DIR`.
 ///
 ///   open the session (its format version is checked) -> take its kernel lock -> open the event log
@@ -42,7 +39,7 @@ enum class JobExit : int { kDone = 0, kFailed = 1, kBadInput = 2, kCancelled = 3
 /// The body does what is not yet done and returns kCancelled soon after a stop; kBusy says that the
 /// station is in use and the stage should be tried again. What it throws is caught and reported.
 ///
-/// Returns JobExit: 2 for bad usage, a directory that is no session or of a newer version, and a
+/// Returns ProgramExit (daemon/jobs/program.h): 2 for bad usage, a directory that is no session or of a newer version, and a
 /// body's kInvalidArgument or kNotFound; 4 when another job holds the session.
 /// SIGTERM and SIGINT are handled from here on; a child that is only forked inherits the handlers.
 int run_job(int argc, char** argv, const JobDescription& job, const JobBody& body);

@@ -1,12 +1,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
 #include "base/files.h"
 #include "base/io/transport_io.h"
 #include "base/log.h"
+#include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
 #include "sim/light_transport.h"
@@ -130,12 +130,7 @@ opaline::Result<void> run(Arguments& a, const std::stop_token& stop) {
   return write_transport(opaline::system_files(), a.output, *responses);
 }
 
-int exit_code(opaline::ErrorCode code) {
-  if (code == opaline::ErrorCode::kInvalidArgument) return 2;
-  return code == opaline::ErrorCode::kCancelled ? 3 : 1;
-}
-
-int run_program(int argc, char** argv) {
+int program(int argc, char** argv) {
   CLI::App app("Computes the light transport of a simulated sample, patch by patch.");
   Arguments arguments;
   add_options(app, arguments);
@@ -153,16 +148,9 @@ int run_program(int argc, char** argv) {
   const auto done = run(arguments, stop.get_token());
   if (done) return 0;
   opaline::log::error("{}", done.error().message);
-  return exit_code(done.error().code);
+  return opaline::daemon::status_of(done);
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    return run_program(argc, argv);
-  } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return opaline::daemon::run_program(argc, argv, program); }
