@@ -21,9 +21,9 @@ struct Key {
   bool required = false;  ///< missing is a problem; otherwise the value stays as it is
 };
 
-/// What a number is: a quantity is written with its unit ("33 ms", "24 mm", "10 deg", "1/30 s"),
-/// a plain number without, and then the key's name carries the unit where there is one.
-enum class Unit : std::uint8_t { kPlain, kLength, kTime, kAngle };
+/// What a number is: a quantity is written with its unit ("33 ms", "24 mm", "10 deg", "1/30 s",
+/// "2 %"), a plain number without, and then the key's name carries the unit where there is one.
+enum class Unit : std::uint8_t { kPlain, kLength, kTime, kAngle, kShare };
 
 /// Allowed values.
 struct Range {
@@ -88,6 +88,10 @@ class Fields {
   }
   void length_mm(const Key& key, double& value, Range range = Range::above(0.0)) {
     quantity(key, value, Unit::kLength, range);
+  }
+  /// "2 %" is 0.02.
+  void share(const Key& key, double& value, Range range = Range::between(0.0, 1.0)) {
+    quantity(key, value, Unit::kShare, range);
   }
   template <class Integer>
   void whole(const Key& key, Integer& value, Range range) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 #include <vector>
 
@@ -31,7 +32,8 @@ constexpr std::array kUnits{NamedUnit{"s", Unit::kTime, 1, 1},
                             NamedUnit{"um", Unit::kLength, 1, 1e3},
                             NamedUnit{"µm", Unit::kLength, 1, 1e3},
                             NamedUnit{"deg", Unit::kAngle, 1, 1},
-                            NamedUnit{"rad", Unit::kAngle, 180, 3.14159265358979323846}};
+                            NamedUnit{"rad", Unit::kAngle, 180, 3.14159265358979323846},
+                            NamedUnit{"%", Unit::kShare, 1, 100}};
 
 std::string_view trim(std::string_view text) {
   const std::size_t first = text.find_first_not_of(' ');
@@ -63,6 +65,15 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+/// In per cent, with as few digits as read back to the same share.
+std::string format_share(double value) {
+  for (int digits = 1; digits < 17; ++digits) {
+    std::string text = fmt::format("{:.{}g}", 100.0 * value, digits);
+    if (std::strtod(text.c_str(), nullptr) / 100.0 == value) return text + " %";
+  }
+  return fmt::format("{} %", 100.0 * value);
+}
+
 std::string_view suffix(Unit unit) {
   switch (unit) {
     case Unit::kLength:
@@ -71,6 +82,7 @@ std::string_view suffix(Unit unit) {
       return " s";
     case Unit::kAngle:
       return " deg";
+    case Unit::kShare:
     case Unit::kPlain:
       break;
   }
@@ -117,6 +129,7 @@ std::string format_quantity(double value, Unit unit) {
       return text;
     }
   }
+  if (unit == Unit::kShare) return format_share(value);
   return fmt::format("{}{}", value, suffix(unit));
 }
 
@@ -128,6 +141,8 @@ std::string_view describe(Unit unit) {
       return "a time with its unit, such as \"33 ms\" or \"1/30 s\"";
     case Unit::kAngle:
       return "an angle with its unit, such as \"10 deg\"";
+    case Unit::kShare:
+      return "a share in per cent, such as \"2 %\"";
     case Unit::kPlain:
       break;
   }

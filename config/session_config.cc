@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "config/agreement.h"
 #include "config/block_fields.h"
+#include "config/quality.h"
 
 namespace opaline::config {
 namespace {
@@ -21,6 +22,7 @@ constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 2> kMethodNames{"lbfgs", "as_published"};
+constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -81,7 +83,16 @@ void visit_bounds(Fields& fields, reconstruct::CoefficientBounds& bounds) {
       bounds.highest > bounds.lowest, "highest_per_mm", "expected more than lowest_per_mm");
 }
 
-void visit_reconstruction(Fields& fields, InverseOptions& r) {
+void visit_reduction(Fields& fields, reconstruct::Reduction& r) {
+  fields.number({"grid_step", "cells of the sample to one that is solved for, along each axis"},
+                r.grid_step,
+                Range::between(1, 64));
+  fields.whole({"use_regions", "n: put the captured ones together to n x n; 0: as captured"},
+               r.regions,
+               Range::between(0, 32));
+}
+
+void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduction& reduction) {
   fields.one_of({"source", "how light enters"}, r.source, kSourceNames);
   fields.one_of({"deposit", "where a cell's share of the collimated source is put"},
                 r.deposit,
@@ -108,6 +119,7 @@ void visit_reconstruction(Fields& fields, InverseOptions& r) {
                 r.stalled,
                 Range::at_least(0));
   fields.whole({"checkpoint_every", "iterations"}, r.checkpoint_every, Range::between(1, 100000));
+  visit_reduction(fields, reduction);
   fields.one_of({"back_end", "what computes"}, r.back_end, kBackEndNames);
   fields.whole({"threads", "0: one a core"}, r.threads, Range::between(0, 1024));
   fields.table({"absorption", "Bounds of sigma_a."},
@@ -126,22 +138,36 @@ void visit_preview(Fields& fields, PreviewOptions& p) {
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
 }
 
+/// Before all that the quality sets, so that what is written out has the last word.
+void visit_accuracy(Fields& fields, SessionConfig& session) {
+  fields.one_of(
+      {"quality", "sets what is not set below (docs/accuracy.md)"}, session.quality, kQualityNames);
+  if (fields.is_reading()) apply(session.quality, session);
+  fields.share({"target_error", "relighting error to reach by the cheapest settings; 0 %: none"},
+               session.target_error);
+}
+
 /// `agreement` with the rig, when that has been read.
 void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement = nullptr) {
   fields.text({"name", "of the session, for people"}, session.name);
   std::string rig_file = session.rig_file.string();
   fields.text({"rig", "the rig file", true}, rig_file);
   session.rig_file = rig_file;
+  visit_accuracy(fields, session);
   fields.table({"sample", "What is measured."}, [&](Fields& f) {
     visit_sample(f, session);
     if (agreement != nullptr) agreement->visit_sample(f, session.sample);
   });
   fields.table({"capture", "How it is captured."},
                [&](Fields& f) { visit_capture(f, session, agreement); });
-  fields.table({"reconstruction", "How the material is found."},
-               [&](Fields& f) { visit_reconstruction(f, session.reconstruction); });
+  fields.table({"reconstruction", "How the material is found."}, [&](Fields& f) {
+    visit_reconstruction(f, session.reconstruction, session.reduction);
+  });
   fields.table({"preview", "How the report's pictures are made."},
                [&](Fields& f) { visit_preview(f, session.preview); });
+  fields.check(!(session.target_error > 0.0) || session.capture.patterns.held_out_lights > 0,
+               "target_error",
+               "cannot be measured without capture.held_out_lights; expected 4 or more of those");
 }
 
 /// Both files, and all that is wrong with them.
@@ -218,6 +244,10 @@ bool is_rig_file(const Source& source) {
 }
 
 }  // namespace
+
+std::string_view to_string(Quality quality) {
+  return kQualityNames[static_cast<std::size_t>(quality)];
+}
 
 Result<SessionConfig> parse_session(const Source& session, const Source& rig) {
   return accept(read_both(session, rig, false));

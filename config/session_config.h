@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "config/rig_config.h"
 #include "config/toml.h"
 #include "reconstruct/inverse_options.h"
+#include "reconstruct/reduction.h"
 
 namespace opaline::config {
 
@@ -21,15 +23,24 @@ struct PreviewOptions {
   double tolerance = 1e-6;        ///< of the light's solution in the material; > 0
 };
 
+/// One word for the settings that trade time for accuracy (config/quality.h).
+enum class Quality : std::uint8_t { kDraft, kStandard, kReference };
+std::string_view to_string(Quality quality);  ///< "draft" | "standard" | "reference"
+
 /// A session file with its rig file: all that a session is made from.
 struct SessionConfig {
-  std::string name = "session";  ///< for people
+  std::string name = "session";          ///< for people
+  Quality quality = Quality::kStandard;  ///< what the settings were taken from that stand nowhere
+  /// Relighting error to reach with the cheapest settings that do (reconstruct/target_error.h); 0:
+  /// the settings as they are.
+  double target_error = 0.0;
   std::filesystem::path rig_file;
   RigConfig rig;
   std::string sample_name = "sample";
   capture::SampleGeometry sample;
   capture::CaptureOptions capture;
   reconstruct::InverseOptions reconstruction;
+  reconstruct::Reduction reduction;  ///< in [reconstruction], too
   PreviewOptions preview;
 };
 

@@ -28,8 +28,14 @@ std::string duration(double seconds) {
 }
 
 // In the order that an operator reads; what is not named here comes after.
-constexpr std::array<std::string_view, 7> kOrder{
-    "light", "region", "exposure", "channel", "iteration", "objective", "chi_squared_per_datum"};
+constexpr std::array<std::string_view, 8> kOrder{"rung",
+                                                 "light",
+                                                 "region",
+                                                 "exposure",
+                                                 "channel",
+                                                 "iteration",
+                                                 "objective",
+                                                 "chi_squared_per_datum"};
 
 std::vector<std::string> keys_in_order(const nlohmann::json& detail) {
   std::vector<std::string> keys;
@@ -57,8 +63,8 @@ std::string details(const nlohmann::json& detail) {
 
 // What an operator follows besides the stages; other facts are for programs.
 bool is_notable(std::string_view type) {
-  constexpr std::array<std::string_view, 6> kEndings{
-      ".failed", ".retaken", ".damaged", ".unusable", ".warning", ".masked"};
+  constexpr std::array<std::string_view, 7> kEndings{
+      ".failed", ".retaken", ".damaged", ".unusable", ".warning", ".masked", ".measured"};
   return std::ranges::any_of(kEndings, [&](std::string_view end) { return type.ends_with(end); });
 }
 

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "base/clock.h"
 #include "base/io/dataset_io.h"
 #include "base/io/volume_io.h"
@@ -7,35 +9,76 @@
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/version.h"
 #include "reconstruct/back_end.h"
-#include "reconstruct/inverse_solver.h"
 #include "reconstruct/summary.h"
+#include "reconstruct/target_error.h"
 
 namespace opaline::daemon {
 namespace {
+
+using reconstruct::TargetReport;
+using reconstruct::TargetResult;
+
+/// To the accuracy that is asked for, or with the settings as they are.
+Result<TargetResult> find_material(const config::SessionConfig& config,
+                                   const Dataset& dataset,
+                                   const reconstruct::ReducedContext& context,
+                                   const std::stop_token& stop) {
+  if (config.target_error > 0.0)
+    return reconstruct::reconstruct_to_target(
+        dataset, config.target_error, config.reduction, config.reconstruction, context, stop);
+  auto result = reconstruct::reconstruct_reduced(
+      dataset, config.reduction, config.reconstruction, context, stop);
+  if (!result) return result.error();
+  return TargetResult{*std::move(result), {}};
+}
+
+nlohmann::ordered_json to_json(const TargetReport& report) {
+  auto rungs = nlohmann::ordered_json::array();
+  for (const reconstruct::RungReport& r : report.rungs) {
+    rungs.push_back({{"name", r.name},
+                     {"relighting_error", r.held_out.error},
+                     {"noise_floor", r.held_out.noise_floor},
+                     {"seconds", r.seconds}});
+  }
+  return {{"target", report.target},
+          {"reached", report.reached},
+          {"chosen", report.chosen},
+          {"message", report.message},
+          {"rungs", std::move(rungs)}};
+}
+
+std::string summary(const config::SessionConfig& config,
+                    const Dataset& dataset,
+                    const TargetResult& found) {
+  auto json = nlohmann::ordered_json::parse(
+      reconstruct::summary_json(dataset, config.reconstruction, found.result));
+  json["quality"] = config::to_string(config.quality);
+  json["grid_step"] = config.reduction.grid_step;
+  json["use_regions"] = config.reduction.regions;
+  if (config.target_error > 0.0) json["target_error"] = to_json(found.report);
+  return json.dump(2) + "\n";
+}
 
 Result<void> reconstruct_session(JobContext& job) {
   const auto config = config::load_resolved(job.session);
   if (!config) return config.error();
   const auto dataset = read_dataset(job.session.path());
   if (!dataset) return dataset.error().in("dataset");
-  const reconstruct::InverseOptions& options = config->reconstruction;
-  const auto solver = reconstruct::make_solver(options);
+  const auto solver = reconstruct::make_solver(config->reconstruction);
   if (!solver) return solver.error();
   const SystemClock clock;
-  const reconstruct::CheckpointStore checkpoints(
-      job.files, job.session.checkpoint(), reconstruct::fingerprint(*dataset, options));
-  auto result = reconstruct::reconstruct_material(
-      *dataset, options, {**solver, job.events, clock, &checkpoints}, job.stop);
-  if (!result) return result.error();
-  result->material.name = config->sample_name;
+  auto found = find_material(*config,
+                             *dataset,
+                             {**solver, job.events, clock, &job.files, job.session.checkpoint()},
+                             job.stop);
+  if (!found) return found.error();
+  found->result.material.name = config->sample_name;
   auto written = write_material(job.files,
                                 job.session.material(),
-                                result->material,
+                                found->result.material,
                                 fmt::format("opaline-reconstruct {}", version()));
   if (!written) return written;
-  return write_whole(job.files,
-                     job.session.reconstruction(),
-                     reconstruct::summary_json(*dataset, options, *result));
+  return write_whole(job.files, job.session.reconstruction(), summary(*config, *dataset, *found));
 }
 
 }  // namespace

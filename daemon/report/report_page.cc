@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/io/image_io.h"
+#include "daemon/report/accuracy.h"
 #include "daemon/report/html.h"
 #include "daemon/report/picture.h"
 #include "daemon/report/report_plots.h"
@@ -115,6 +116,7 @@ void add_header(const ReportData& data, Page& page) {
                                   {"capture", "Capture"},
                                   {"fit", "Fit"},
                                   {"convergence", "Convergence"},
+                                  {"accuracy", "Accuracy"},
                                   {"material", "Material"},
                                   {"assumptions", "Assumptions"},
                                   {"timings", "Timings"},
@@ -276,6 +278,7 @@ Result<std::string> report_page(const ReportData& data) {
   add_capture(data, page);
   add_fit(data, page);
   add_convergence(data, page);
+  page.add(accuracy_section(data));
   add_material(data, page);
   page.add(html::section("assumptions", "What was assumed", html::facts(assumptions(data))));
   add_timings(data, page);

@@ -16,6 +16,13 @@ TEST(Quantity, TakesANumberAndAUnitOfItsKind) {
   EXPECT_EQ(parse_quantity("10 deg", Unit::kAngle), 10.0);
 }
 
+TEST(Quantity, PrintsSharesInPerCent) {
+  EXPECT_EQ(parse_quantity("2 %", Unit::kShare), 0.02);
+  EXPECT_EQ(parse_quantity("0.35%", Unit::kShare), 0.0035);
+  for (const char* text : {"2 %", "0.35 %", "0 %", "7 %", "14.3 %"})
+    EXPECT_EQ(format_quantity(parse_quantity(text, Unit::kShare).value(), Unit::kShare), text);
+}
+
 TEST(Quantity, RefusesWhatIsNotOne) {
   for (const char* text :
        {"", "8", "s", "8 mm", "8 S", "1/0 s", "8 s s", "nan s", "inf s", "1e999 s"}) {

@@ -64,6 +64,55 @@ TEST_F(SessionConfigTest, TakesTheDefaultsWhereAFileSaysNothing) {
   EXPECT_EQ(session->rig.sim.rig.camera.model, sim::demo_camera_model());
 }
 
+TEST_F(SessionConfigTest, TakesFromTheQualityWhatIsNotWritten) {
+  write("rig.toml", "");
+  const auto load = [&](const char* more) {
+    auto session = load_session(write("session.toml", std::string("rig = \"rig.toml\"\n") + more));
+    EXPECT_TRUE(session) << session.error().message;
+    return *session;
+  };
+  const SessionConfig plain = load("");
+  const SessionConfig standard = load("quality = \"standard\"\n");
+  EXPECT_EQ(to_toml(standard), to_toml(plain));
+  const SessionConfig draft = load("quality = \"draft\"\n");
+  const SessionConfig reference = load("quality = \"reference\"\n");
+  EXPECT_GT(draft.reduction.grid_step, standard.reduction.grid_step);
+  EXPECT_LT(draft.capture.patterns.regions, standard.capture.patterns.regions);
+  EXPECT_GT(reference.capture.patterns.regions, standard.capture.patterns.regions);
+  EXPECT_LT(reference.reconstruction.tolerance, standard.reconstruction.tolerance);
+  const SessionConfig mixed =
+      load("quality = \"draft\"\n[capture]\nregions = 6\n[reconstruction]\ngrid_step = 1\n");
+  EXPECT_EQ(mixed.capture.patterns.regions, 6);
+  EXPECT_EQ(mixed.reduction.grid_step, 1.0);
+  EXPECT_EQ(mixed.reconstruction.max_iterations, draft.reconstruction.max_iterations);
+}
+
+TEST_F(SessionConfigTest, WritesWhatAQualityStandsForIntoTheResolvedFile) {
+  write("rig.toml", "");
+  const auto session = load_session(write("session.toml",
+                                          "rig = \"rig.toml\"\nquality = \"draft\"\ntarget_error = "
+                                          "\"2.5 %\"\n[capture]\nregions = 3\n"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_DOUBLE_EQ(session->target_error, 0.025);
+  const auto again = parse_resolved({"resolved.toml", to_toml(*session), {}});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->quality, Quality::kDraft);
+  EXPECT_EQ(again->capture.patterns.regions, 3);
+  EXPECT_EQ(again->reduction, session->reduction);
+  EXPECT_EQ(to_toml(*again), to_toml(*session));
+  EXPECT_THAT(to_toml(*session), HasSubstr("target_error = \"2.5 %\""));
+}
+
+TEST_F(SessionConfigTest, WantsHeldOutLightsForATargetError) {
+  write("rig.toml", "");
+  EXPECT_THAT(problems_of(write("session.toml",
+                                "rig = \"rig.toml\"\ntarget_error = \"2 %\"\n[capture]\n"
+                                "held_out_lights = 0\n")),
+              ElementsAre(AllOf(StartsWith("2:"), HasSubstr("held_out_lights"))));
+  EXPECT_THAT(problems_of(write("session.toml", "rig = \"rig.toml\"\ntarget_error = 0.02\n")),
+              ElementsAre(HasSubstr("such as \"2 %\"")));
+}
+
 TEST_F(SessionConfigTest, ReadsItsOwnResolvedFileBackToTheSameConfiguration) {
   const auto session = load_session(config_file("sim.toml"));
   ASSERT_TRUE(session) << session.error().message;
