@@ -29,8 +29,9 @@ struct CaptureOptions {
   int retries = 3;            ///< of a light with a bad frame, before the session stops; 0 to 100
   int settle_periods = 2;     ///< projector frames to wait on top of its latency; 0 to 1000
   double min_coverage = 0.5;  ///< of a surface cell by usable camera pixels; 0 < c <= 1
-  /// Around a lit region on the face the camera looks at: masked; 0 to 1000.
-  double direct_light_margin_mm = 3.0;
+  /// Masked around a lit region on the face the camera looks at, for the lens's blur and stray light;
+  /// 0 to 1000. What the diffusion model cannot say there is left out by the reconstruction.
+  double direct_light_margin_mm = 0.5;
   double usable_share = 0.5;  ///< of the regions: fewer usable ones end the session; 0 to 1
 };
 

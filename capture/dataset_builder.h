@@ -11,8 +11,7 @@ namespace opaline::capture {
 Dataset empty_dataset(const SampleGeometry& sample, const SurfaceMap& map);
 
 /// One light's measurement for the dataset. Where the camera looks at the lit face itself, cells
-/// within `margin_mm` of directly lit ones are masked: there the diffusion model is off
-/// (docs/physics.md). `usable` false masks everything.
+/// within `margin_mm` of directly lit ones are masked. `usable` false masks everything.
 Illumination illumination_of(const Light& light,
                              const SurfaceRadiance& surface,
                              const SampleGeometry& sample,

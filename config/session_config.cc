@@ -63,9 +63,10 @@ void visit_capture(Fields& fields, SessionConfig& session, const Agreement* agre
   fields.number({"min_coverage", "share of a surface cell that usable pixels must see"},
                 c.min_coverage,
                 Range{.min = 0.0, .max = 1.0, .min_excluded = true});
-  fields.length_mm({"direct_light_margin", "masked around a lit region on the seen face"},
-                   c.direct_light_margin_mm,
-                   Range::between(0, 1000));
+  fields.length_mm(
+      {"direct_light_margin", "masked around a lit region on the seen face: blur, stray light"},
+      c.direct_light_margin_mm,
+      Range::between(0, 1000));
   fields.number({"usable_share", "of the regions; fewer usable ones end the session"},
                 c.usable_share,
                 Range::between(0, 1));
@@ -100,6 +101,10 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.one_of({"boundary", "condition at the surface"}, r.boundary, kBoundaryNames);
   fields.number({"model_error", "relative, of the diffusion model itself"},
                 r.model_error,
+                Range::at_least(0));
+  fields.number({"direct_light_paths",
+                 "transport mean free paths around a lit region on the seen face, left out"},
+                r.direct_light_paths,
                 Range::at_least(0));
   fields.number(
       {"regularization", "weight of smoothness; 0: none"}, r.regularization, Range::at_least(0));

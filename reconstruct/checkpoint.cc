@@ -137,6 +137,7 @@ void append_image(std::vector<std::byte>& bytes, const Image<T>& image) {
 
 void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
   const std::array numbers{o.model_error,
+                           o.direct_light_paths,
                            o.regularization,
                            static_cast<double>(o.max_iterations),
                            o.tolerance,

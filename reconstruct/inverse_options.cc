@@ -42,6 +42,8 @@ std::string_view to_string(Method method) {
 }
 
 Result<void> validate(const InverseOptions& o) {
+  if (!not_negative(o.direct_light_paths))
+    return expected("direct_light_paths", o.direct_light_paths, ">= 0");
   if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");
   if (!not_negative(o.regularization)) return expected("regularization", o.regularization, ">= 0");
   if (o.max_iterations < 0) return expected("max_iterations", o.max_iterations, ">= 0");

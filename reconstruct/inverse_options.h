@@ -39,6 +39,9 @@ struct InverseOptions {
   /// Relative error of the diffusion model: (model_error hypot(L, l))^2 is added to the variance of each datum, l the
   /// root mean square of its picture, since the model's error far from the light does not fall with L; >= 0.
   double model_error = 0.01;
+  /// Seen cells within so many transport mean free paths of directly lit ones are left out (reconstruct/direct_light.h);
+  /// 0: only lit ones; >= 0.
+  double direct_light_paths = 3.0;
   /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
   double regularization = 300.0;
   Method method = Method::kLbfgs;

@@ -59,9 +59,10 @@ struct InverseResult {
   std::array<ChannelReport, kColorChannels> channels;
   std::vector<Image<float>>
       predicted;  ///< radiance per illumination of the dataset, held-out ones too; as measured ones
-  RelightingError fitted;    ///< over the illuminations of the fit
-  RelightingError held_out;  ///< over those kept from it; 0 when there is none
-  std::string solver;        ///< "host, 2 threads, AVX2"
+  RelightingError fitted;               ///< over the illuminations of the fit
+  RelightingError held_out;             ///< over those kept from it; 0 when there is none
+  double direct_light_margin_mm = 0.0;  ///< around lit cells on the seen face, left out
+  std::string solver;                   ///< "host, 2 threads, AVX2"
   double seconds = 0.0;
 };
 

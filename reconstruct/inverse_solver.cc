@@ -7,6 +7,7 @@
 
 #include "base/log.h"
 #include "reconstruct/channel_solver.h"
+#include "reconstruct/direct_light.h"
 #include "reconstruct/prediction.h"
 #include "reconstruct/relighting_error.h"
 
@@ -159,7 +160,15 @@ Result<InverseResult> reconstruct_material(const Dataset& dataset,
                                            const InverseContext& context,
                                            std::stop_token stop) {
   if (auto valid = validate(options); !valid) return valid.error();
-  return Reconstruction(dataset, options, context).run(std::move(stop));
+  const auto margin = direct_light_margin(dataset, options, context.solver, stop);
+  if (!margin) return margin.error().in("direct light");
+  const Dataset masked = without_direct_light(dataset, *margin);
+  auto result = Reconstruction(masked, options, context).run(std::move(stop));
+  if (!result && result.error().code == ErrorCode::kInvalidArgument && *margin > 0.0) {
+    return result.error().in(fmt::format("{:.1f} mm around lit cells left out", *margin));
+  }
+  if (result) result->direct_light_margin_mm = *margin;
+  return result;
 }
 
 }  // namespace opaline::reconstruct

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "reconstruct/direct_light.h"
 #include "reconstruct/relighting_error.h"
 
 namespace opaline::reconstruct {
@@ -21,6 +22,7 @@ Json to_json(const InverseOptions& o) {
           {"boundary", to_string(o.boundary)},
           {"method", to_string(o.method)},
           {"model_error", o.model_error},
+          {"direct_light_paths", o.direct_light_paths},
           {"regularization", o.regularization},
           {"max_iterations", o.max_iterations},
           {"tolerance", o.tolerance},
@@ -71,8 +73,9 @@ std::string summary_json(const Dataset& dataset,
   for (std::size_t c = 0; c < kColorChannels; ++c)
     channels.push_back(to_json(result.channels[c], kChannelNames[c]));
   Json illuminations = Json::array();
-  for (std::size_t m = 0; m < dataset.illuminations.size(); ++m) {
-    const Illumination& i = dataset.illuminations[m];
+  const Dataset masked = without_direct_light(dataset, result.direct_light_margin_mm);
+  for (std::size_t m = 0; m < masked.illuminations.size(); ++m) {
+    const Illumination& i = masked.illuminations[m];
     illuminations.push_back({{"name", i.name},
                              {"held_out", i.held_out},
                              {"relighting_error", relighting_error(i, result.predicted[m]).error}});
@@ -82,6 +85,7 @@ std::string summary_json(const Dataset& dataset,
                      {"seconds", result.seconds},
                      {"fitted", to_json(result.fitted)},
                      {"held_out", to_json(result.held_out)},
+                     {"direct_light_margin_mm", result.direct_light_margin_mm},
                      {"options", to_json(options)},
                      {"channels", std::move(channels)},
                      {"illuminations", std::move(illuminations)}};

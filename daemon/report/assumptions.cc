@@ -25,6 +25,13 @@ std::string source(const reconstruct::InverseOptions& options) {
              : "surface: diffuse light enters at the boundary";
 }
 
+std::string left_out(const ReportData& data) {
+  if (data.dataset.lit_face != data.dataset.seen_face) return "nothing: another face is seen";
+  return fmt::format("{:.2f} mm: {} transport mean free paths",
+                     data.reconstruction.value("direct_light_margin_mm", 0.0),
+                     data.config.reconstruction.direct_light_paths);
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& data) {
@@ -39,6 +46,7 @@ std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& d
       {"Light source", source(options)},
       {"Light enters by", std::string(to_string(data.dataset.lit_face))},
       {"Camera sees", std::string(to_string(data.dataset.seen_face))},
+      {"Left out around lit regions", left_out(data)},
       {"Model error",
        fmt::format("{} % of each datum and of its picture, on top of the measured noise",
                    100.0 * options.model_error)},

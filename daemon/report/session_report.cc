@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/clock.h"
+#include "base/direct_light.h"
 #include "base/event_log.h"
 #include "base/io/dataset_io.h"
 #include "base/io/image_io.h"
@@ -58,6 +59,12 @@ Result<ReportData> read_session(const SessionDirectory& session) {
   data.reconstruction = nlohmann::json::parse(*text, nullptr, false);
   if (!data.reconstruction.is_object()) {
     return invalid_argument(fmt::format("{} is not JSON", session.reconstruction().string()));
+  }
+  if (data.dataset.lit_face == data.dataset.seen_face) {
+    const double margin = data.reconstruction.value("direct_light_margin_mm", 0.0);
+    for (Illumination& i : data.dataset.illuminations) {
+      mask_direct_light(data.dataset.block, data.dataset.lit_face, i.irradiance, margin, i.mask);
+    }
   }
   return data;
 }
