@@ -19,11 +19,13 @@
 #include "bench/figure.h"
 #include "bench/forward/forward_case.h"
 #include "bench/inverse/finite_elements.h"
+#include "bench/inverse/material_cases.h"
 #include "bench/inverse/transport_dataset.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/diffusion/medium.h"
 #include "reconstruct/diffusion/source.h"
+#include "reconstruct/direct_light.h"
 #include "reconstruct/inverse_solver.h"
 #include "reconstruct/prediction.h"
 #include "reconstruct/relighting_error.h"
@@ -76,9 +78,17 @@ Result<Case> make_case(const std::string& name) {
     if (!responses) return responses.error();
     return Case{name, *std::move(responses), name == "48x48x12" ? 4 : 8};
   }
-  if (!name.ends_with(".transport"))
+  if (const auto material = material_case(name)) {
+    auto responses = responses_of(*material, cache_directory());
+    if (!responses) return responses.error();
+    return Case{name, *std::move(responses), 4};
+  }
+  if (!name.ends_with(".transport")) {
     return invalid_argument(
-        fmt::format("no case '{}'; there are 48x48x12, 48x48x12-n8 and *.transport files", name));
+        fmt::format("no case '{}'; there are 48x48x12, 48x48x12-n8, {} and *.transport files",
+                    name,
+                    fmt::join(material_case_names(), ", ")));
+  }
   auto responses = read_transport(name);
   if (!responses) return responses.error();
   return Case{fs::path(name).stem(), *std::move(responses), 4};
@@ -95,6 +105,7 @@ Dataset only(const Dataset& dataset, const std::string& kind) {
 Result<void> judge(const Case& which,
                    const char* what,
                    const Dataset& dataset,
+                   double margin_mm,
                    const Material& material,
                    const InverseOptions& options,
                    FluenceSolver& solver) {
@@ -110,7 +121,8 @@ Result<void> judge(const Case& which,
     print_figure(prefix + "relighting_error", name, error.error, "1");
     print_figure(prefix + "noise_floor", name, error.noise_floor, "1");
   }
-  const Dataset patches = patch_dataset(which.responses);
+  const Dataset patches =
+      reconstruct::without_direct_light(patch_dataset(which.responses), margin_mm);
   const auto predicted = reconstruct::predict(patches, material, options, solver, {});
   if (!predicted) return predicted.error();
   const auto error = reconstruct::relighting_error(patches, *predicted, true);
@@ -215,13 +227,17 @@ Result<void> run(const Case& which,
   print_figure("inverse.solves", which.name, effort_of(*result).solves, "1");
   print_figure("inverse.seconds", which.name, result->seconds, "s");
   print_figure("inverse.peak_mb", which.name, peak_megabytes(), "MB");
+  const double margin = result->direct_light_margin_mm;
+  if (margin > 0.0) print_figure("inverse.direct_light_margin", which.name, margin, "mm");
+  const Dataset measured = reconstruct::without_direct_light(dataset, margin);
   if (const auto scene = sim::scene_from_json(which.responses.scene)) {
     const auto truth = sim::make_material(*scene);
     if (!truth) return truth.error();
-    if (auto judged = judge(which, "truth_", dataset, *truth, options, **solver); !judged)
+    if (auto judged = judge(which, "truth_", measured, margin, *truth, options, **solver); !judged)
       return judged;
   }
-  if (auto judged = judge(which, "", dataset, result->material, options, **solver); !judged)
+  if (auto judged = judge(which, "", measured, margin, result->material, options, **solver);
+      !judged)
     return judged;
   return published ? compare_with_published(which, dataset, options, *result, **solver) : ok();
 }
@@ -249,9 +265,14 @@ int main(int argc, char** argv) try {
       "Reconstructs samples from known light transport and judges them by lights they never saw.\n"
       "Example: inverse_solve --case 48x48x12 --regularization 100");
   std::vector<std::string> names{"48x48x12", "48x48x12-n8", "sim/data/demo_marble.transport"};
+  for (const std::string& name : bench::material_case_names()) names.push_back(name);
   bench::TransportDatasetOptions data;
   reconstruct::InverseOptions options;
-  app.add_option("--case", names, "48x48x12, 48x48x12-n8 (finite elements), or a transport file")
+  app.add_option("--case",
+                 names,
+                 "48x48x12, 48x48x12-n8 (finite elements); marble, wax or stone with -back or "
+                 "-front (Monte "
+                 "Carlo, some minutes the first time); or a transport file")
       ->take_all();
   bool published = false;
   app.add_flag("--published", published, "Compare with the paper's minimisation: minutes a case");
