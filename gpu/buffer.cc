@@ -29,10 +29,16 @@ Result<std::uint32_t> memory_type(const Context::Handles& context,
 
 Result<void> allocate(Buffer::Handles& h, Memory memory) {
   const vk::MemoryRequirements needs = h.buffer.getMemoryRequirements();
-  const auto type = memory_type(*h.context, needs.memoryTypeBits, memory);
+  Context::Handles& context = *h.context;
+  const auto type = memory_type(context, needs.memoryTypeBits, memory);
   if (!type) return type.error();
   return guarded("allocating", [&] {
-    h.memory = vk::raii::DeviceMemory(h.context->device, {needs.size, *type});
+    const bool rehearsed = ++context.allocations == context.options.rehearsal.full_at_allocation;
+    if (rehearsed || context.allocated_bytes + needs.size > context.info.memory_bytes)
+      throw vk::OutOfDeviceMemoryError("");
+    h.memory = vk::raii::DeviceMemory(context.device, {needs.size, *type});
+    h.allocated_bytes = needs.size;
+    context.allocated_bytes += needs.size;
     h.buffer.bindMemory(*h.memory, 0);
     if (memory == Memory::kHost)
       h.mapped = static_cast<std::byte*>(h.memory.mapMemory(0, VK_WHOLE_SIZE));

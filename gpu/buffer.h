@@ -24,7 +24,7 @@ enum class Memory : std::uint8_t {
 class Buffer {
  public:
   /// Errors: kInvalidArgument for 0 bytes or more than one binding sees, kUnavailable when memory
-  /// is short.
+  /// is short: the driver's word, or this context's buffers would outgrow DeviceInfo::memory_bytes.
   static Result<Buffer> create(Context& context, std::uint64_t bytes, Memory memory);
   Buffer(Buffer&&) noexcept;
   Buffer& operator=(Buffer&&) noexcept;

@@ -61,6 +61,10 @@ Result<std::unique_ptr<Context>> Context::create(const ContextOptions& options) 
 
 const DeviceInfo& Context::device() const { return handles_->info; }
 
+std::uint64_t Context::memory_left() const {
+  return handles_->info.memory_bytes - handles_->allocated_bytes;
+}
+
 Result<void> Context::run(const Commands& commands) {
   const auto point = submit(commands);
   if (!point) return point.error();
@@ -74,6 +78,7 @@ Result<std::uint64_t> Context::submit(const Commands& commands) {
     const vk::CommandBufferSubmitInfo buffer(*commands.handles().commands);
     const vk::SemaphoreSubmitInfo signal(
         *h.timeline, h.submitted + 1, vk::PipelineStageFlagBits2::eAllCommands);
+    if (++h.submissions == h.options.rehearsal.lost_at_submission) throw vk::DeviceLostError("");
     h.queue.submit2(vk::SubmitInfo2({}, {}, buffer, signal));
   });
   if (!sent) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string_view>
@@ -13,14 +14,23 @@ namespace opaline::gpu {
 
 class Commands;
 
+/// A device treated as smaller than it is, and made to fail on cue: for tests of what happens then.
+struct Rehearsal {
+  std::uint64_t max_binding_bytes = 0;  ///< 0: the device's own
+  std::uint64_t memory_bytes = 0;       ///< 0: the device's own
+  int lost_at_submission = 0;  ///< the device is lost at the n-th, counted from 1; 0: never
+  int full_at_allocation = 0;  ///< its memory is full at the n-th; 0: never
+};
+
 struct ContextOptions {
   DeviceWish device;
-  bool validation =
-      validation_from_environment();  ///< Khronos' validation layer; slow, finds real errors
+  /// Khronos' validation layer, synchronisation (missing barriers) included; slow, finds real errors.
+  bool validation = validation_from_environment();
   std::chrono::milliseconds deadline{30'000};  ///< for the work of one submission; > 0
   /// Hears every warning and error of the validation layer, from any thread, also while the context
   /// is destroyed; nobody there: they go to the log.
   std::function<void(std::string_view)> on_validation_message;
+  Rehearsal rehearsal;
 
   /// True when OPALINE_VULKAN_VALIDATION is set to anything but 0.
   static bool validation_from_environment();
@@ -45,6 +55,8 @@ class Context {
   Context& operator=(const Context&) = delete;
 
   const DeviceInfo& device() const;
+  /// What is left of the device's memory, as far as this context's own buffers are concerned.
+  std::uint64_t memory_left() const;
 
   /// Sends recorded commands to the device and waits for them until the options' deadline.
   /// Work that was submitted cannot be recalled: submit little at a time and look at a stop token

@@ -46,8 +46,11 @@ struct Context::Handles {
   vk::raii::Semaphore timeline = nullptr;
   vk::PhysicalDeviceMemoryProperties memory;
   std::uint32_t queue_family = 0;
-  std::uint64_t submitted = 0;  ///< the timeline's value when all is done
-  bool lost = false;            ///< a deadline passed or the device is gone
+  std::uint64_t submitted = 0;        ///< the timeline's value when all is done
+  std::uint64_t allocated_bytes = 0;  ///< of all buffers
+  int submissions = 0;
+  int allocations = 0;
+  bool lost = false;  ///< a deadline passed or the device is gone
   DeviceInfo info;
   ContextOptions options;
 
@@ -73,8 +76,12 @@ struct Buffer::Handles {
   vk::raii::DeviceMemory memory = nullptr;
   vk::raii::Buffer buffer = nullptr;
   std::uint64_t bytes = 0;
+  std::uint64_t allocated_bytes = 0;
   std::byte* mapped = nullptr;
-  ~Handles() { release_if_busy(*context, buffer, memory); }
+  ~Handles() {
+    context->allocated_bytes -= allocated_bytes;
+    release_if_busy(*context, buffer, memory);
+  }
 };
 
 struct RenderTarget::Handles {

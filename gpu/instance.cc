@@ -108,10 +108,14 @@ Result<void> create_instance(Context::Handles& handles) {
     const vk::ApplicationInfo application("opaline", 1, nullptr, 0, VK_API_VERSION_1_3);
     vk::InstanceCreateInfo info({}, &application);
     static constexpr std::array layers{"VK_LAYER_KHRONOS_validation"};
-    static constexpr std::array extensions{VK_EXT_DEBUG_UTILS_EXTENSION_NAME};
-    const auto messenger = messenger_info(handles.options);
+    static constexpr std::array extensions{VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
+                                           VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    static constexpr vk::ValidationFeatureEnableEXT kBarriers =
+        vk::ValidationFeatureEnableEXT::eSynchronizationValidation;
+    auto messenger = messenger_info(handles.options);
+    const vk::ValidationFeaturesEXT features(kBarriers, {}, &messenger);
     if (handles.options.validation) {
-      info.setPEnabledLayerNames(layers).setPEnabledExtensionNames(extensions).setPNext(&messenger);
+      info.setPEnabledLayerNames(layers).setPEnabledExtensionNames(extensions).setPNext(&features);
     }
     handles.instance = vk::raii::Instance(handles.loader, info);
     if (handles.options.validation)
@@ -143,6 +147,9 @@ std::uint32_t queue_family(const vk::raii::PhysicalDevice& device, bool graphics
 Result<void> create_device(Context::Handles& handles, PhysicalDevice chosen) {
   handles.physical = std::move(chosen.handle);
   handles.info = std::move(chosen.candidate.info);
+  const Rehearsal& smaller = handles.options.rehearsal;
+  if (smaller.max_binding_bytes > 0) handles.info.max_binding_bytes = smaller.max_binding_bytes;
+  if (smaller.memory_bytes > 0) handles.info.memory_bytes = smaller.memory_bytes;
   handles.memory = handles.physical.getMemoryProperties();
   handles.queue_family = queue_family(handles.physical, handles.options.device.graphics);
   return guarded(fmt::format("opening {}", handles.info.name), [&] {

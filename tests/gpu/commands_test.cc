@@ -105,6 +105,67 @@ TEST_F(CommandsTest, RefusesABufferThatNoBindingCouldSee) {
   EXPECT_THAT(buffer.error().message, HasSubstr(std::to_string(most)));
 }
 
+// Two kernels in a row that write and read the same buffer: what orders them on a real device is the barrier alone.
+TEST_F(CommandsTest, HearsFromTheValidationLayerOfABarrierThatIsMissing) {
+  int hazards = 0;
+  ContextOptions options = tests::validated();
+  options.on_validation_message = [&](std::string_view message) {
+    hazards += message.find("SYNC-HAZARD") != std::string_view::npos ? 1 : 0;
+  };
+  const auto context = Context::create(options);
+  ASSERT_TRUE(context) << context.error().message;
+  const auto kernel = Pipeline::create_compute(
+      **context, "scale_add", shaders::scale_add_comp, {2, sizeof(ScaleAdd)});
+  auto x = Buffer::create(**context, 400, Memory::kDevice);
+  auto y = Buffer::create(**context, 400, Memory::kDevice);
+  auto commands = Commands::create(**context);
+  ASSERT_TRUE(kernel && x && y && commands && commands->begin());
+  commands->fill_zero(*x);
+  commands->fill_zero(*y);
+  commands->barrier();
+  const ScaleAdd push{100, 1.0F};
+  commands->dispatch(*kernel, {{{&*x, &*y}}, push_of(push)}, {1, 1, 1});
+  commands->dispatch(*kernel, {{{&*y, &*x}}, push_of(push)}, {1, 1, 1});
+  ASSERT_TRUE(commands->end());
+  EXPECT_GE(hazards, 1);
+}
+
+TEST_F(CommandsTest, LosesItsDeviceOnCueAndIsLostFromThenOn) {
+  ContextOptions options = tests::validated();
+  options.rehearsal.lost_at_submission = 2;
+  const auto context = Context::create(options);
+  ASSERT_TRUE(context) << context.error().message;
+  auto commands = Commands::create(**context);
+  ASSERT_TRUE(commands && commands->begin() && commands->end());
+  EXPECT_TRUE((*context)->run(*commands));
+  const auto second = (*context)->run(*commands);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(second.error().message, HasSubstr("the GPU was lost"));
+  EXPECT_THAT((*context)->run(*commands).error().message, HasSubstr("was lost earlier"));
+}
+
+TEST_F(CommandsTest, KeepsItsBuffersWithinTheDevicesMemoryAndGivesBackWhatTheyHeld) {
+  ContextOptions options = tests::validated();
+  options.rehearsal.memory_bytes = 4 << 20;
+  options.rehearsal.full_at_allocation = 3;
+  const auto context = Context::create(options);
+  ASSERT_TRUE(context) << context.error().message;
+  const std::uint64_t whole = (*context)->memory_left();
+  {
+    const auto held = Buffer::create(**context, 3 << 20, Memory::kDevice);
+    ASSERT_TRUE(held);
+    EXPECT_LE((*context)->memory_left(), whole - (3 << 20));
+    const auto refused = Buffer::create(**context, 2 << 20, Memory::kDevice);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+    EXPECT_THAT(refused.error().message, HasSubstr("out of GPU memory"));
+  }
+  EXPECT_EQ((*context)->memory_left(), whole);
+  EXPECT_FALSE(Buffer::create(**context, 16, Memory::kDevice));  // the third: on cue
+  EXPECT_TRUE(Buffer::create(**context, 16, Memory::kDevice));
+}
+
 TEST_F(CommandsTest, RefusesARenderTargetLargerThanTheDeviceDraws) {
   const auto target = RenderTarget::create(*context_, context_->device().max_image_side + 1, 1);
   ASSERT_FALSE(target);
