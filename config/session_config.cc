@@ -126,6 +126,8 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.whole({"checkpoint_every", "iterations"}, r.checkpoint_every, Range::between(1, 100000));
   visit_reduction(fields, reduction);
   fields.one_of({"back_end", "what computes"}, r.back_end, kBackEndNames);
+  fields.flag({"back_end_fallback", "host takes over when the device of vulkan fails"},
+              r.back_end_fallback);
   fields.whole({"threads", "0: one a core"}, r.threads, Range::between(0, 1024));
   fields.table({"absorption", "Bounds of sigma_a."},
                [&](Fields& f) { visit_bounds(f, r.absorption); });

@@ -3,13 +3,19 @@
 #include <memory>
 
 #include "base/result.h"
+#include "gpu/context.h"
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/inverse_options.h"
 
 namespace opaline::reconstruct {
 
 /// The diffusion solver that the options ask for.
-/// Errors: kUnavailable when this build or machine has no such back end.
-Result<std::unique_ptr<diffusion::FluenceSolver>> make_solver(const InverseOptions& options);
+///
+///   auto    a Vulkan device that is not a CPU, else host; when that device fails, host
+///   vulkan  any Vulkan device; when there is none or it fails, host where options.back_end_fallback allows it
+///
+/// Errors: kUnavailable when this build or machine has no such back end and no other is allowed.
+Result<std::unique_ptr<diffusion::FluenceSolver>> make_solver(const InverseOptions& options,
+                                                              const gpu::ContextOptions& gpu = {});
 
 }  // namespace opaline::reconstruct

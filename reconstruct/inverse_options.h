@@ -56,6 +56,8 @@ struct InverseOptions {
   CoefficientBounds reduced_scattering{0.02, 100.0};
   int checkpoint_every = 10;  ///< iterations; >= 1
   BackEnd back_end = BackEnd::kAuto;
+  /// Whether host takes over when the device of back_end = "vulkan" is missing, full or lost; with "auto" it always does.
+  bool back_end_fallback = false;
   int threads = 0;  ///< of the host back end; 0: one a core
 };
 Result<void> validate(const InverseOptions& options);  ///< "tolerance = 0; expected > 0"

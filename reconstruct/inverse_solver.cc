@@ -30,7 +30,6 @@ class Reconstruction {
     if (context_.checkpoints != nullptr) checkpoint_ = context_.checkpoints->load();
     result_.material.block = dataset_.block;
     result_.material.ior = dataset_.ior;
-    result_.solver = context_.solver.description();
     result_.predicted = empty_pictures(dataset_);
     for (std::size_t channel = 0; channel < kColorChannels; ++channel) {
       auto done = run_channel(channel, stop);
@@ -38,6 +37,7 @@ class Reconstruction {
     }
     result_.fitted = relighting_error(dataset_, result_.predicted, false);
     result_.held_out = relighting_error(dataset_, result_.predicted, true);
+    result_.solver = context_.solver.description();  // the one that did the last of it
     result_.seconds = seconds();
     return std::move(result_);
   }
