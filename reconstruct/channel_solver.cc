@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/log.h"
+#include "reconstruct/fallback_solver.h"
 #include "reconstruct/published_step.h"
 
 namespace opaline::reconstruct {
@@ -17,13 +19,15 @@ ChannelSolver::ChannelSolver(const ChannelProblem& problem,
                              Parametrization parametrization,
                              diffusion::FluenceSolver& solver,
                              const Clock& clock,
-                             Hooks hooks)
+                             Hooks hooks,
+                             InversionEngine* engine)
     : problem_(problem),
       options_(options),
       parametrization_(std::move(parametrization)),
       solver_(solver),
       clock_(clock),
       hooks_(std::move(hooks)),
+      engine_(engine),
       objective_(problem, solver, {options.tolerance, options.regularization}) {}
 
 Bounds ChannelSolver::bounds() const {
@@ -40,7 +44,7 @@ Bounds ChannelSolver::bounds() const {
 void ChannelSolver::record(ChannelProgress& progress) {
   const Evaluation& at = progress.state.at;
   ChannelReport& report = progress.report;
-  report.solves = solves_before_ + objective_.solves();
+  report.solves = solves_before_ + objective_.solves() + (on_engine_ ? on_engine_->solves() : 0);
   report.seconds = seconds_before_ + std::chrono::duration<double>(clock_.now() - start_).count();
   report.history.push_back({static_cast<int>(report.history.size()),
                             at.value,
@@ -98,6 +102,11 @@ std::optional<StopReason> ChannelSolver::reason_to_stop(const ChannelReport& rep
 Result<StepOutcome> ChannelSolver::step(LbfgsState& state,
                                         const Bounds& box,
                                         std::stop_token stop) {
+  if (on_engine_) {
+    auto outcome = on_engine_->step(std::move(stop));
+    if (outcome) state.at = on_engine_->at();
+    return outcome;
+  }
   const ObjectiveFunction objective = [this](std::span<const double> x, std::stop_token token) {
     return evaluate(x, std::move(token));
   };
@@ -110,23 +119,49 @@ Result<StepOutcome> ChannelSolver::step(LbfgsState& state,
   return published_step(state, box, {objective, value}, std::move(stop));
 }
 
+Result<void> ChannelSolver::begin_on_engine(const ChannelProgress& progress) {
+  const bool every_cell =
+      parametrization_.reduced_scattering().is_full() && parametrization_.absorption().is_full();
+  if (engine_ == nullptr || !every_cell) return ok();
+  auto begun = engine_->begin(problem_, options_, progress.state);
+  if (!begun && !is_device_failure(begun.error())) return begun.error();
+  if (!begun) {
+    log::warning("{}; minimising outside the device", begun.error().message);
+    return ok();
+  }
+  on_engine_ = *std::move(begun);
+  read_back_ = progress;
+  return ok();
+}
+
+Result<void> ChannelSolver::read_back(ChannelProgress& progress) {
+  if (!on_engine_) return ok();
+  auto state = on_engine_->state();
+  if (!state) return state.error();
+  progress.state = *std::move(state);
+  read_back_ = progress;
+  return ok();
+}
+
 Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {
   const Bounds box = bounds();
   for (;;) {
     if (const auto reason = reason_to_stop(progress.report)) {
       progress.report.stop_reason = *reason;
-      return ok();
+      return read_back(progress);
     }
     const auto outcome = step(progress.state, box, stop);
     if (!outcome) return outcome.error();
     if (*outcome == StepOutcome::kNoDescent) {
       progress.report.stop_reason = StopReason::kNoDescent;
-      return ok();
+      return read_back(progress);
     }
     record(progress);
     if (progress.report.history.back().iteration % options_.checkpoint_every != 0) continue;
+    if (auto read = read_back(progress); !read) return read;
     if (auto saved = hooks_.checkpoint(progress); !saved) return saved;
     objective_.start_afresh();
+    if (on_engine_) on_engine_->start_afresh();
   }
 }
 
@@ -141,7 +176,18 @@ Result<ChannelProgress> ChannelSolver::run(std::optional<ChannelProgress> from,
     if (!begun) return begun.error();
     from = *std::move(begun);
   }
-  if (auto done = iterate(*from, stop); !done) return done.error();
+  if (auto begun = begin_on_engine(*from); !begun) return begun.error();
+  auto done = iterate(*from, stop);
+  if (!done && on_engine_ && is_device_failure(done.error())) {
+    log::warning("{}; going on without the device from iteration {}",
+                 done.error().message,
+                 read_back_.report.history.back().iteration);
+    solves_before_ += on_engine_->solves();
+    on_engine_.reset();
+    *from = read_back_;
+    done = iterate(*from, stop);
+  }
+  if (!done) return done.error();
   return *std::move(from);
 }
 

@@ -10,12 +10,16 @@
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/minimiser.h"
 #include "reconstruct/parametrization.h"
 
 namespace opaline::reconstruct {
 
 /// The minimisation of one channel over the parameters a of a Parametrization, J(P a) with the gradient P^T dJ/dp, from
 /// the homogeneous fit, from a simpler model's answer, or from where it stopped. LbfgsState::x holds a.
+///
+/// Where every cell is a parameter and there is an engine that does what the options ask, it minimises; when its device
+/// fails the objective on the solver goes on from the last checkpoint.
 class ChannelSolver {
  public:
   struct Hooks {
@@ -33,7 +37,8 @@ class ChannelSolver {
                 Parametrization parametrization,
                 diffusion::FluenceSolver& solver,
                 const Clock& clock,
-                Hooks hooks);
+                Hooks hooks,
+                InversionEngine* engine = nullptr);
 
   /// What run() begins with instead of a homogeneous fit of its own.
   void start_from(WarmStart warm) { warm_ = std::move(warm); }
@@ -46,6 +51,8 @@ class ChannelSolver {
   Result<Evaluation> evaluate(std::span<const double> x, std::stop_token stop);
   Result<StepOutcome> step(LbfgsState& state, const Bounds& box, std::stop_token stop);
   Result<void> iterate(ChannelProgress& progress, std::stop_token stop);
+  Result<void> begin_on_engine(const ChannelProgress& progress);
+  Result<void> read_back(ChannelProgress& progress);
   void record(ChannelProgress& progress);
   std::optional<StopReason> reason_to_stop(const ChannelReport& report) const;
   Bounds bounds() const;
@@ -56,6 +63,9 @@ class ChannelSolver {
   diffusion::FluenceSolver& solver_;
   const Clock& clock_;
   Hooks hooks_;
+  InversionEngine* engine_;
+  std::unique_ptr<Minimiser> on_engine_;  // null: the objective below does the work
+  ChannelProgress read_back_;             // where to go on from when the engine fails
   Objective objective_;
   std::optional<WarmStart> warm_;
   long solves_before_ = 0;  // of the homogeneous fit and earlier runs of this channel

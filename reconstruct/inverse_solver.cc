@@ -76,7 +76,8 @@ class Reconstruction {
                          context_.solver,
                          context_.clock,
                          {[&](const ChannelReport& report) { report_progress(channel, report); },
-                          [&](const ChannelProgress& progress) { return save(progress); }});
+                          [&](const ChannelProgress& progress) { return save(progress); }},
+                         context_.engine);
     auto progress = solver.run(std::exchange(checkpoint_.current, std::nullopt), stop);
     if (!progress) return progress.error();
     const ChannelReport& report = progress->report;

@@ -10,6 +10,7 @@
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/inverse_options.h"
 #include "reconstruct/inverse_result.h"
+#include "reconstruct/minimiser.h"
 
 namespace opaline::reconstruct {
 
@@ -19,6 +20,7 @@ struct InverseContext {
   EventSink& events;
   const Clock& clock;
   const CheckpointStore* checkpoints = nullptr;  ///< null: none are kept
+  InversionEngine* engine = nullptr;             ///< null: every minimisation runs on the solver
 };
 
 /// Recovers sigma_a and sigma_s' per cell and channel from pictures of a lit sample

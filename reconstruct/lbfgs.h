@@ -8,6 +8,7 @@
 
 #include "base/result.h"
 #include "reconstruct/evaluation.h"
+#include "reconstruct/lbfgs_space.h"
 
 namespace opaline::reconstruct {
 
@@ -26,8 +27,9 @@ struct CurvaturePair {
 /// Where a minimisation stands: all that the next step depends on.
 struct LbfgsState {
   std::vector<double> x;
-  Evaluation at;                    ///< the objective at x
-  std::deque<CurvaturePair> pairs;  ///< oldest first
+  Evaluation at;                      ///< the objective at x
+  std::deque<CurvaturePair> pairs;    ///< oldest first
+  std::deque<PairProducts> products;  ///< of the pairs; made afresh where there are not as many
 };
 
 struct LbfgsOptions {
@@ -54,7 +56,17 @@ using ObjectiveFunction =
 /// safeguarded cubic interpolation and goes further while the curvature condition of Wolfe fails.
 /// Value and gradient come from one evaluation; a step usually takes one.
 ///
-/// Errors: the objective's; the state is unchanged then.
+/// The recursion runs on the products of the vectors (Chen, Wang & Zhou, Large-scale L-BFGS using MapReduce, NIPS 2014,
+/// alg. 3), so that it touches no vector: the step is the same wherever they live.
+///
+/// `products` are those of the pairs that the space remembers.
+/// Errors: the space's; it stays at x then.
+Result<StepOutcome> lbfgs_step(LbfgsSpace& space,
+                               std::deque<PairProducts>& products,
+                               const LbfgsOptions& options,
+                               const std::stop_token& stop);
+
+/// The same on vectors in the processor's memory. Errors: the objective's; the state is unchanged then.
 Result<StepOutcome> lbfgs_step(LbfgsState& state,
                                const Bounds& bounds,
                                const LbfgsOptions& options,
