@@ -1,0 +1,115 @@
+#include "render/mesh/mesh_distance.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "render/mesh/shapes.h"
+#include "tests/render/mesh_samples.h"
+
+namespace opaline::render {
+namespace {
+
+std::vector<Vec3> random_points(const Box& box, int count) {
+  std::mt19937 generator(7);  // NOLINT(bugprone-random-generator-seed): the same points each time
+  std::uniform_real_distribution<double> uniform(-0.2, 1.2);
+  std::vector<Vec3> points;
+  const Vec3 size = box.size();
+  for (int i = 0; i < count; ++i) {
+    points.push_back(box.low + Vec3{uniform(generator) * size.x,
+                                    uniform(generator) * size.y,
+                                    uniform(generator) * size.z});
+  }
+  return points;
+}
+
+double distance_to_box(Vec3 p, double edge) {
+  const double h = 0.5 * edge;
+  const Vec3 q{std::abs(p.x - h) - h, std::abs(p.y - h) - h, std::abs(p.z - h) - h};
+  const Vec3 outside{std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0)};
+  return length(outside) + std::min(std::max({q.x, q.y, q.z}), 0.0);
+}
+
+TEST(MeshDistance, OfACubeIsTheClosedForm) {
+  const auto distance = MeshDistance::create(cube_mesh(3.0));
+  ASSERT_TRUE(distance);
+  for (const Vec3& p : random_points((*distance)->bounds(), 500)) {
+    EXPECT_NEAR((*distance)->at(p), distance_to_box(p, 3.0), 1e-12);
+  }
+}
+
+TEST(MeshDistance, OfAFineSphereIsTheSpheres) {
+  const auto distance = MeshDistance::create(sphere_mesh(10.0, 100));
+  ASSERT_TRUE(distance);
+  for (const Vec3& p : random_points((*distance)->bounds(), 500)) {
+    // The facets lie up to R (1 - cos(pi / 200)) = 0.0012 mm inside the sphere, twice that between two rings' diagonals.
+    EXPECT_NEAR((*distance)->at(p), length(p) - 10.0, 0.003);
+  }
+}
+
+TEST(MeshDistance, AMeshInsideOutIsTurnedAround) {
+  TriangleMesh cube = cube_mesh(1.0);
+  for (auto& t : cube.triangles) std::swap(t[0], t[1]);
+  const auto distance = MeshDistance::create(cube);
+  ASSERT_TRUE(distance);
+  EXPECT_DOUBLE_EQ((*distance)->at({0.5, 0.5, 0.5}), -0.5);
+  EXPECT_DOUBLE_EQ((*distance)->at({0.5, 0.5, 1.5}), 0.5);
+}
+
+TEST(MeshDistance, AHoleIsClosedAsBySoap) {
+  TriangleMesh mesh = sphere_mesh(10.0, 40);
+  std::erase_if(mesh.triangles, [&](const auto& t) { return mesh.vertices[t[0]].z > 9.8; });
+  ASSERT_GT(topology(mesh).open_edges, 0U);
+  const auto distance = MeshDistance::create(mesh);
+  ASSERT_TRUE(distance);
+  for (const Vec3& p : random_points((*distance)->bounds(), 1000)) {
+    if (p.z > 8.0 || std::abs(length(p) - 10.0) < 0.1) continue;
+    EXPECT_EQ((*distance)->at(p) < 0.0, length(p) < 10.0) << p.x << " " << p.y << " " << p.z;
+  }
+}
+
+TEST(MeshDistance, WhatOverlapsIsOneSolid) {
+  TriangleMesh mesh = cube_mesh(2.0);
+  append(mesh, cube_mesh(2.0, {1.0, 0.5, 0.5}));
+  const auto distance = MeshDistance::create(mesh);
+  ASSERT_TRUE(distance);
+  for (const Vec3& p : random_points((*distance)->bounds(), 500)) {
+    const double expected =
+        std::min(distance_to_box(p, 2.0), distance_to_box(p - Vec3{1.0, 0.5, 0.5}, 2.0));
+    EXPECT_EQ((*distance)->at(p) < 0.0, expected < 0.0);
+  }
+}
+
+TEST(MeshDistance, TrianglesWithoutAreaAreRefused) {
+  TriangleMesh mesh = cube_mesh(1.0);
+  mesh.triangles = {{0, 0, 1}, {1, 1, 1}};
+  EXPECT_FALSE(MeshDistance::create(mesh));
+  EXPECT_FALSE(MeshDistance::create({}));
+}
+
+TEST(Shapes, ChangeNoFasterThanThePointMovesAndLieInTheirBounds) {
+  for (const auto name : shape_names()) {
+    const auto shape = make_shape(name, 20.0);
+    ASSERT_TRUE(shape) << name;
+    const auto points = random_points((*shape)->bounds(), 400);
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const double moved = length(points[i] - points[i - 1]);
+      const double changed = (*shape)->at(points[i]) - (*shape)->at(points[i - 1]);
+      EXPECT_LE(std::abs(changed), moved + 1e-9) << name;
+      const Vec3 p = points[i];
+      const Box box = (*shape)->bounds();
+      const bool outside = p.x < box.low.x || p.y < box.low.y || p.z < box.low.z ||
+                           p.x > box.high.x || p.y > box.high.y || p.z > box.high.z;
+      if (outside) {
+        EXPECT_GT((*shape)->at(p), 0.0) << name;
+      }
+    }
+  }
+  EXPECT_FALSE(make_shape("teapot", 20.0));
+  EXPECT_FALSE(make_shape("sphere", 0.0));
+}
+
+}  // namespace
+}  // namespace opaline::render
