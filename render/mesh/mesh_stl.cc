@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 
@@ -44,10 +45,9 @@ Result<TriangleMesh> decode_binary(std::string_view bytes) {
   mesh.vertices.reserve(3 * count);
   mesh.triangles.reserve(count);
   for (std::size_t t = 0; t < count; ++t) {
-    float corners[9];
-    std::memcpy(corners, bytes.data() + kHeader + kRecord * t + 12, sizeof corners);
-    for (int k = 0; k < 3; ++k)
-      mesh.vertices.push_back({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]});
+    std::array<std::array<float, 3>, 3> corners{};
+    std::memcpy(corners.data(), bytes.data() + kHeader + kRecord * t + 12, sizeof corners);
+    for (const auto& [x, y, z] : corners) mesh.vertices.push_back({x, y, z});
     add_triangle(mesh);
   }
   return mesh;

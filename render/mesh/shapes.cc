@@ -128,6 +128,7 @@ constexpr std::array kShapes{
 
 std::vector<std::string_view> shape_names() {
   std::vector<std::string_view> names;
+  names.reserve(kShapes.size());
   for (const Named& named : kShapes) names.push_back(named.name);
   return names;
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 
 namespace opaline::render {
@@ -31,7 +32,6 @@ struct DirectedEdge {
   int low = 0;
   int high = 0;
   bool forward = true;
-  auto operator<=>(const DirectedEdge&) const = default;
 };
 
 std::vector<DirectedEdge> sorted_edges(const TriangleMesh& mesh) {
@@ -44,7 +44,8 @@ std::vector<DirectedEdge> sorted_edges(const TriangleMesh& mesh) {
       if (a != b) edges.push_back({std::min(a, b), std::max(a, b), a < b});
     }
   }
-  std::ranges::sort(edges);
+  std::ranges::sort(
+      edges, {}, [](const DirectedEdge& e) { return std::tie(e.low, e.high, e.forward); });
   return edges;
 }
 
