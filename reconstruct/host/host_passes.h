@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
+#include "base/flush_denormals.h"
+#include "base/thread_team.h"
 #include "reconstruct/diffusion/fluence_solver.h"
-#include "reconstruct/host/flush_denormals.h"
 #include "reconstruct/host/host_grid.h"
 #include "reconstruct/host/row_kernels.h"
-#include "reconstruct/host/thread_team.h"
 #include "reconstruct/host/workspace.h"
 
 namespace opaline::reconstruct::host {

@@ -4,7 +4,7 @@
 #include <xmmintrin.h>
 #endif
 
-namespace opaline::reconstruct::host {
+namespace opaline {
 
 /// While it lives, this thread takes numbers below 1e-38 for zero: light that deep is nothing, and
 /// slow to compute.
@@ -25,4 +25,4 @@ class FlushDenormals {
 #endif
 };
 
-}  // namespace opaline::reconstruct::host
+}  // namespace opaline

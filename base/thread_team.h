@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-namespace opaline::reconstruct::host {
+namespace opaline {
 
 /// Threads that run one function together, again and again, with little to pay in between: they
 /// spin for some microseconds before they sleep. One owner runs one function at a time.
@@ -42,4 +42,4 @@ class ThreadTeam {
   std::vector<std::jthread> threads_;  // last: joins first
 };
 
-}  // namespace opaline::reconstruct::host
+}  // namespace opaline

@@ -1,6 +1,6 @@
-#include "reconstruct/host/thread_team.h"
+#include "base/thread_team.h"
 
-namespace opaline::reconstruct::host {
+namespace opaline {
 namespace {
 
 constexpr int kSpins = 2000;
@@ -54,4 +54,4 @@ void ThreadTeam::serve(int thread) {
   }
 }
 
-}  // namespace opaline::reconstruct::host
+}  // namespace opaline
