@@ -1,0 +1,52 @@
+#pragma once
+
+#include <span>
+
+#include "reconstruct/diffusion/boundary.h"
+#include "render/graph/optics.h"
+#include "render/solver/lane_matrix.h"
+#include "render/tetrahedra/tet_mesh.h"
+
+namespace opaline::render {
+
+/// Linear finite elements on the vertices of the tetrahedra (Arridge et al., A
+/// finite element approach for modeling photon transport in tissue, 1993),
+/// coefficients constant in each: the reference for the graph, over the same
+/// tetrahedra.
+///
+///   sum_tets kappa V grad_i . grad_k phi_k + sigma_a M_ik phi_k + 1 / (2 A)
+///   B_ik phi_k = 1 / (2 A) B_ik S_k
+///
+/// M and B: consistent masses of tetrahedra and surface triangles; S = 4 q / (1
+/// - R_phi); J_n = (phi - S) / (2 A).
+///
+/// Shapes: optics one a tetrahedron; q and the answers one a vertex of the
+/// mesh, 0 in its interior.
+class FiniteElements {
+ public:
+  /// The mesh must outlive it. Errors: kInvalidArgument, see validate(optics),
+  /// or shapes differ.
+  static Result<FiniteElements> create(const TetMesh& mesh,
+                                       std::span<const Optics> optics,
+                                       const reconstruct::diffusion::Boundary& boundary);
+
+  const LaneMatrix<double>& matrix() const { return matrix_; }
+  std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q) const;
+  SurfaceLight surface_light(std::span<const std::array<float, 3>> q,
+                             const std::vector<Lanes<double>>& phi) const;
+  /// A third of the areas of the surface triangles around each vertex; 0
+  /// inside.
+  const std::vector<double>& surface_areas() const { return areas_; }
+
+ private:
+  FiniteElements(const TetMesh& mesh, const reconstruct::diffusion::Boundary& boundary);
+  void assemble(std::span<const Optics> optics);
+
+  const TetMesh* mesh_;
+  reconstruct::diffusion::Boundary boundary_;
+  std::vector<std::array<int, 3>> surface_;
+  std::vector<double> areas_;
+  LaneMatrix<double> matrix_;
+};
+
+}  // namespace opaline::render

@@ -1,0 +1,201 @@
+#include "render/solver/lane_solver.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace opaline::render {
+namespace {
+
+using reconstruct::diffusion::Termination;
+using ::testing::HasSubstr;
+
+/// Conductances between neighbours of an n x n x n grid, different in every
+/// channel; all but its corner in the dark of a small sink. `contrast`: every
+/// other slab of eight layers conducts so many times better.
+template <class T>
+LaneMatrix<T> grid(int n, double contrast = 1.0, double sink = 1e-3) {
+  LaneMatrix<T> a;
+  const auto conductance = [&](int k, int c) {
+    return (1.0 + 0.5 * c) * (k / 8 % 2 == 0 ? 1.0 : contrast);
+  };
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        const int steps[6][3]{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+        for (const auto& step : steps) {
+          const int x = i + step[0];
+          const int y = j + step[1];
+          const int z = k + step[2];
+          if (std::min({x, y, z}) < 0 || std::max({x, y, z}) >= n) continue;
+          a.columns.push_back((z * n + y) * n + x);
+          Lanes<T> entry = Lanes<T>::zero();
+          for (int c = 0; c < 3; ++c) {
+            const double own = conductance(k, c);
+            const double other = conductance(z, c);
+            entry.set(c, static_cast<T>(-2.0 * own * other / (own + other)));
+          }
+          a.entries.push_back(entry);
+        }
+        a.starts.push_back(static_cast<int>(a.columns.size()));
+        a.sinks.push_back(Lanes<T>::all(static_cast<T>(k == 0 ? 0.3 : sink)));
+      }
+    }
+  }
+  return a;
+}
+
+template <class T>
+std::vector<Lanes<T>> random_field(int rows, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<Lanes<T>> field(rows, Lanes<T>::zero());
+  for (auto& value : field) {
+    for (int c = 0; c < 3; ++c) value.set(c, static_cast<T>(uniform(generator)));
+  }
+  return field;
+}
+
+template <class T>
+std::vector<Lanes<T>> dark(int rows) {
+  return std::vector<Lanes<T>>(rows, Lanes<T>::zero());
+}
+
+Eigen::MatrixXd dense(const LaneMatrix<double>& a, int channel) {
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(a.rows(), a.rows());
+  for (int i = 0; i < a.rows(); ++i) {
+    matrix(i, i) = a.diagonal(i)[channel];
+    for (int e = a.starts[i]; e < a.starts[i + 1]; ++e)
+      matrix(i, a.columns[e]) = a.entries[e][channel];
+  }
+  return matrix;
+}
+
+TEST(LaneSolver, AgreesWithADirectSolverInEveryChannel) {
+  ThreadTeam team(2);
+  const auto a = grid<double>(9, 50.0);
+  LaneSolver<double> solver(a, {.coarsest_rows = 20}, team);
+  ASSERT_GT(solver.hierarchy().levels(), 2);
+  const auto b = random_field<double>(a.rows(), 1);
+  auto x = dark<double>(a.rows());
+  const auto summary = solver.solve(b, x, {.tolerance = 1e-10}, {});
+  ASSERT_EQ(summary.termination, Termination::kConverged) << summary.message;
+  for (int c = 0; c < 3; ++c) {
+    Eigen::VectorXd right(a.rows());
+    for (int i = 0; i < a.rows(); ++i) right[i] = b[i][c];
+    const Eigen::VectorXd exact = dense(a, c).ldlt().solve(right);
+    for (int i = 0; i < a.rows(); ++i) EXPECT_NEAR(x[i][c], exact[i], 1e-7 * exact.maxCoeff());
+  }
+}
+
+TEST(LaneSolver, IterationsHardlyGrowWithTheNumberOfNodes) {
+  ThreadTeam team(2);
+  int small = 0;
+  for (const int n : {16, 32, 48}) {
+    const auto a = grid<float>(n, 1.0, 1e-2);
+    LaneSolver<float> solver(a, {}, team);
+    auto x = dark<float>(a.rows());
+    const auto summary = solver.solve(random_field<float>(a.rows(), 2), x, {.tolerance = 1e-4}, {});
+    ASSERT_EQ(summary.termination, Termination::kConverged) << summary.message;
+    if (small == 0) small = summary.iterations;
+    EXPECT_LE(summary.iterations, small + 4) << n;
+    EXPECT_LE(solver.hierarchy().complexity(), 2.0);
+  }
+}
+
+TEST(LaneSolver, ContrastsOfAMillionConverge) {
+  ThreadTeam team(2);
+  for (const double contrast : {1e-6, 1e6}) {
+    const auto a = grid<double>(24, contrast);
+    LaneSolver<double> solver(a, {}, team);
+    auto x = dark<double>(a.rows());
+    const auto summary = solver.solve(
+        random_field<double>(a.rows(), 3), x, {.tolerance = 1e-6, .max_iterations = 60}, {});
+    EXPECT_EQ(summary.termination, Termination::kConverged) << contrast << ": " << summary.message;
+  }
+}
+
+TEST(LaneSolver, WhatSinglePrecisionCannotReachIsSaid) {
+  ThreadTeam team(2);
+  const auto a = grid<float>(24, 1e6);
+  LaneSolver<float> solver(a, {}, team);
+  auto x = dark<float>(a.rows());
+  const auto summary = solver.solve(
+      random_field<float>(a.rows(), 3), x, {.tolerance = 1e-12, .max_iterations = 200}, {});
+  EXPECT_NE(summary.termination, Termination::kConverged);
+  EXPECT_GT(summary.relative_residual, 1e-12);
+}
+
+TEST(LaneSolver, OneCycleIsASymmetricOperator) {
+  ThreadTeam team(2);
+  const auto a = grid<double>(14, 10.0);
+  Hierarchy<double> hierarchy(a, {});
+  const auto u = random_field<double>(a.rows(), 4);
+  const auto v = random_field<double>(a.rows(), 5);
+  auto bu = dark<double>(a.rows());
+  auto bv = dark<double>(a.rows());
+  hierarchy.precondition(a, u, bu, team);
+  hierarchy.precondition(a, v, bv, team);
+  for (int c = 0; c < 3; ++c) {
+    double ubv = 0.0;
+    double vbu = 0.0;
+    for (int i = 0; i < a.rows(); ++i) {
+      ubv += u[i][c] * bv[i][c];
+      vbu += v[i][c] * bu[i][c];
+    }
+    EXPECT_NEAR(ubv / vbu, 1.0, 1e-10);
+  }
+}
+
+TEST(LaneSolver, ALightThatIsACombinationOfThoseBeforeNeedsNoIteration) {
+  ThreadTeam team(2);
+  const auto a = grid<float>(20, 1.0, 0.1);
+  LaneSolver<float> solver(a, {}, team, 3);
+  const auto first = random_field<float>(a.rows(), 6);
+  const auto second = random_field<float>(a.rows(), 7);
+  auto x = dark<float>(a.rows());
+  EXPECT_GT(solver.solve(first, x, {.tolerance = 1e-5}, {}).iterations, 2);
+  EXPECT_GT(solver.solve(second, x, {.tolerance = 1e-5}, {}).iterations, 2);
+  auto mixed = first;
+  for (std::size_t i = 0; i < mixed.size(); ++i) mixed[i] = first[i] * 0.7f + second[i] * 0.5f;
+  const auto summary = solver.solve(mixed, x, {.tolerance = 1e-4}, {});
+  EXPECT_EQ(summary.iterations, 0) << summary.message;
+  solver.matrix_changed();
+  auto cold = dark<float>(a.rows());
+  EXPECT_GT(solver.solve(mixed, cold, {.tolerance = 1e-4}, {}).iterations, 2);
+}
+
+TEST(LaneSolver, AChannelWithoutLightIsDarkWhateverItWasBefore) {
+  ThreadTeam team(1);
+  const auto a = grid<float>(12);
+  LaneSolver<float> solver(a, {}, team);
+  auto b = random_field<float>(a.rows(), 8);
+  for (auto& value : b) value.set(1, 0.0f);
+  auto x = random_field<float>(a.rows(), 9);
+  ASSERT_EQ(solver.solve(b, x, {.tolerance = 1e-4}, {}).termination, Termination::kConverged);
+  for (const auto& value : x) EXPECT_EQ(value[1], 0.0f);
+  EXPECT_GT(x[0][0], 0.0f);
+}
+
+TEST(LaneSolver, EndsWithTheReasonWhereItCannotGoOn) {
+  ThreadTeam team(1);
+  const auto a = grid<float>(12);
+  LaneSolver<float> solver(a, {}, team);
+  auto b = random_field<float>(a.rows(), 10);
+  auto x = dark<float>(a.rows());
+  EXPECT_EQ(solver.solve(b, x, {.tolerance = 1e-6, .max_iterations = 1}, {}).termination,
+            Termination::kIterationLimit);
+  std::stop_source stop;
+  stop.request_stop();
+  x = dark<float>(a.rows());
+  EXPECT_EQ(solver.solve(b, x, {}, stop.get_token()).termination, Termination::kCancelled);
+  b[7].set(0, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_EQ(solver.solve(b, x, {}, {}).termination, Termination::kBreakdown);
+}
+
+}  // namespace
+}  // namespace opaline::render
