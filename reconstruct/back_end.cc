@@ -17,34 +17,47 @@ Solver make_host(int threads) {
   return host::make_host_solver(host);
 }
 
-Solver make_vulkan(const InverseOptions& options, const gpu::ContextOptions& gpu) {
+Result<BackEndParts> with(Solver solver) {
+  if (!solver) return solver.error();
+  return BackEndParts{*std::move(solver), nullptr};
+}
+
+Result<BackEndParts> make_vulkan(const InverseOptions& options, const gpu::ContextOptions& gpu) {
   const auto host = [threads = options.threads] { return make_host(threads); };
-  auto solver = vulkan::make_vulkan_solver({gpu});
+  auto made = vulkan::make_vulkan_back_end({gpu});
   const bool may_change = options.back_end == BackEnd::kAuto || options.back_end_fallback;
-  if (!may_change) return solver;
-  if (solver) return make_fallback_solver(*std::move(solver), host);
-  if (!is_device_failure(solver.error())) return solver;
-  log::warning("{}; going on with host", solver.error().message);
-  return host();
+  if (made && may_change)
+    return BackEndParts{make_fallback_solver(std::move(made->solver), host), made->engine};
+  if (made) return BackEndParts{std::move(made->solver), made->engine};
+  if (!may_change || !is_device_failure(made.error())) return made.error();
+  log::warning("{}; going on with host", made.error().message);
+  return with(host());
 }
 
 }  // namespace
 
-Solver make_solver(const InverseOptions& options, const gpu::ContextOptions& gpu) {
+Result<BackEndParts> make_back_end(const InverseOptions& options, const gpu::ContextOptions& gpu) {
   switch (options.back_end) {
     case BackEnd::kReference:
-      return diffusion::make_reference_solver();
+      return with(diffusion::make_reference_solver());
     case BackEnd::kVulkan:
       return make_vulkan(options, gpu);
     case BackEnd::kHost:
-      return make_host(options.threads);
+      return with(make_host(options.threads));
     case BackEnd::kAuto:
       break;
   }
-  if (!vulkan::real_gpu_available()) return make_host(options.threads);
+  if (!vulkan::real_gpu_available()) return with(make_host(options.threads));
   gpu::ContextOptions real = gpu;
   real.device.allow_software = false;
   return make_vulkan(options, real);
+}
+
+Result<std::unique_ptr<diffusion::FluenceSolver>> make_solver(const InverseOptions& options,
+                                                              const gpu::ContextOptions& gpu) {
+  auto made = make_back_end(options, gpu);
+  if (!made) return made.error();
+  return std::move(made->solver);
 }
 
 }  // namespace opaline::reconstruct

@@ -49,11 +49,12 @@ class FallbackSolver final : public FluenceSolver {
     reason_ = fmt::format("{} failed: {}", solver_->description(), why.message);
     auto made = std::exchange(second_, nullptr)();
     if (!made) return made.error().in(reason_);
-    solver_ = *std::move(made);
+    first_ = std::exchange(solver_, *std::move(made));
     const Medium medium = std::exchange(medium_, {});
     return solver_->prepare(medium);
   }
 
+  std::unique_ptr<FluenceSolver> first_;  // once it failed; engines may live in it
   std::unique_ptr<FluenceSolver> solver_;
   MakeSolver second_;  // empty once it was used
   Medium medium_;      // that the second one would have to prepare

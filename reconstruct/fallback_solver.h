@@ -15,7 +15,7 @@ using MakeSolver = std::function<Result<std::unique_ptr<diffusion::FluenceSolver
 
 /// Solves with `first`; when its device fails, logs why, makes the solver that `second` answers, and goes on with that
 /// one, the failed call included: a solve starts again from the fluence as the first solver left it. description()
-/// names both, with the reason.
+/// names both, with the reason. `first` lives on to the end, unused.
 ///
 /// Errors: those of `first` that are not a device's, those of `second`.
 std::unique_ptr<diffusion::FluenceSolver> make_fallback_solver(

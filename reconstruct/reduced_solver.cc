@@ -40,7 +40,7 @@ Result<InverseResult> reconstruct_reduced(const Dataset& dataset,
   auto result = reconstruct_material(
       *less,
       options,
-      {context.solver, context.events, context.clock, store ? &*store : nullptr},
+      {context.solver, context.events, context.clock, store ? &*store : nullptr, context.engine},
       stop);
   if (!result || reduction == Reduction{}) return result;
   auto back = put_back(dataset, options, context.solver, *result, std::move(stop));

@@ -11,6 +11,7 @@
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/inverse_options.h"
 #include "reconstruct/inverse_result.h"
+#include "reconstruct/minimiser.h"
 #include "reconstruct/reduction.h"
 
 namespace opaline::reconstruct {
@@ -22,6 +23,7 @@ struct ReducedContext {
   const Clock& clock;
   FileOperations* files = nullptr;      ///< null: no checkpoints are kept
   std::filesystem::path checkpoints{};  ///< the directory for them
+  InversionEngine* engine = nullptr;    ///< null: every minimisation runs on the solver
 };
 
 /// reconstruct_material() on the reduced dataset, with its material put back on the dataset's own grid. Pictures and

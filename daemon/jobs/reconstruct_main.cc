@@ -64,12 +64,17 @@ Result<void> reconstruct_session(JobContext& job) {
   if (!config) return config.error();
   const auto dataset = read_dataset(job.session.path());
   if (!dataset) return dataset.error().in("dataset");
-  const auto solver = reconstruct::make_solver(config->reconstruction);
-  if (!solver) return solver.error();
+  const auto back_end = reconstruct::make_back_end(config->reconstruction);
+  if (!back_end) return back_end.error();
   const SystemClock clock;
   auto found = find_material(*config,
                              *dataset,
-                             {**solver, job.events, clock, &job.files, job.session.checkpoint()},
+                             {*back_end->solver,
+                              job.events,
+                              clock,
+                              &job.files,
+                              job.session.checkpoint(),
+                              back_end->engine},
                              job.stop);
   if (!found) return found.error();
   found->result.material.name = config->sample_name;

@@ -14,7 +14,7 @@ void main() {
   const int group = int(gl_WorkGroupID.y);
   const uint t = gl_LocalInvocationID.x;
   vec4 sum = vec4(0);
-  for (int i = int(t); i < push.partial.y; i += 128) sum += partials[group * push.partial.y + i];
+  for (int i = int(t); i < push.partial.y; i += 128) sum += partials[push.partial.x + group * push.partial.y + i];
   workgroup_sum[t] = sum;
   for (uint half_width = 64; half_width > 0; half_width /= 2) {
     barrier();

@@ -27,5 +27,5 @@ void main() {
     z[group_offset() + at] = value;
     product = residual * value;
   }
-  store_partial_sum(product);
+  store_partial_sum(product, 0);
 }

@@ -30,5 +30,5 @@ void main() {
     r[at] = residual;
     square = residual * residual;
   }
-  store_partial_sum(square);
+  store_partial_sum(square, 0);
 }

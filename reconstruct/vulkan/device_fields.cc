@@ -32,6 +32,21 @@ Vec4s conductances(const Level& level, bool after) {
   return packed;
 }
 
+/// c = D - sum g: what a cell loses to absorption and through the surface.
+Vec4s high_of(const Level& level) {
+  Vec4s packed = conductances(level, true);
+  for (std::size_t c = 0; c < packed.size(); ++c) {
+    double own = level.diagonal[c];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t stride = level.stride(static_cast<int>(axis));
+      own -= level.conductance[axis][c];
+      if (c / stride % level.cells[axis] != 0) own -= level.conductance[axis][c - stride];
+    }
+    packed[c][3] = static_cast<float>(own);
+  }
+  return packed;
+}
+
 Vec4s low_of(const Level& level) {
   Vec4s packed = conductances(level, false);
   for (std::size_t c = 0; c < packed.size(); ++c)
@@ -72,11 +87,12 @@ Result<void> add(gpu::Context& context,
   return ok();
 }
 
-/// Partial sums of a group: one a workgroup, where sweep.comp writes those of both colours side by side.
+/// Partial sums of a group: two a workgroup, where sweep.comp writes those of both colours and residual.comp both of its
+/// sums.
 std::uint64_t partial_count(const Level& finest) {
   const std::size_t half_rows =
       static_cast<std::size_t>((finest.cells[0] + 1) / 2) * finest.cells[1] * finest.cells[2];
-  return std::max(workgroups(finest.cell_count()), 2 * workgroups(half_rows));
+  return 2 * std::max(workgroups(finest.cell_count()), workgroups(half_rows));
 }
 
 }  // namespace
@@ -84,16 +100,25 @@ std::uint64_t partial_count(const Level& finest) {
 Result<DeviceLevel> DeviceLevel::create(gpu::Context& context, const Level& level) {
   auto low = send(context, low_of(level));
   if (!low) return low.error();
-  auto high = send(context, conductances(level, true));
+  auto high = send(context, high_of(level));
   if (!high) return high.error();
   auto transfer = send(context, transfer_of(level));
   if (!transfer) return transfer.error();
   return DeviceLevel{*std::move(low), *std::move(high), *std::move(transfer)};
 }
 
+Result<DeviceLevel> DeviceLevel::allocate(gpu::Context& context, std::size_t cells) {
+  std::vector<gpu::Buffer> made;
+  for (int i = 0; i < 3; ++i)
+    if (auto added = add(context, kVec4 * cells, gpu::Memory::kDevice, made); !added)
+      return added.error();
+  return DeviceLevel{std::move(made[0]), std::move(made[1]), std::move(made[2])};
+}
+
 Result<DeviceFields> DeviceFields::create(gpu::Context& context,
                                           const std::vector<Level>& levels,
-                                          int groups) {
+                                          int groups,
+                                          Staging staging) {
   DeviceFields f;
   f.groups = groups;
   const std::size_t cells = levels.front().cell_count();
@@ -109,9 +134,10 @@ Result<DeviceFields> DeviceFields::create(gpu::Context& context,
   for (const auto& [bytes, memory, list] :
        {std::tuple(vec4s * partial_count(levels.front()), Memory::kDevice, &f.sums),
         std::tuple(vec4s * kScalarCount, Memory::kDevice, &f.sums),
-        std::tuple(vec4s * cells, Memory::kHost, &f.host),
         std::tuple(vec4s * kScalarCount, Memory::kHost, &f.host)})
     if (auto made = add(context, bytes, memory, *list); !made) return made.error();
+  if (staging == Staging::kNone) return f;
+  if (auto made = add(context, vec4s * cells, Memory::kHost, f.host); !made) return made.error();
   return f;
 }
 

@@ -44,8 +44,12 @@ Result<Kernels> Kernels::create(gpu::Context& context) {
   compiler.add("apply", shaders::apply_comp, 5);
   compiler.add("update", shaders::update_comp, 6);
   compiler.add("reduce", shaders::reduce_comp, 2);
+  compiler.add("fold", shaders::fold_comp, 3);
+  compiler.add("residual", shaders::residual_comp, 7);
   if (compiler.error()) return *compiler.error();
   return Kernels{compiler.next(),
+                 compiler.next(),
+                 compiler.next(),
                  compiler.next(),
                  compiler.next(),
                  compiler.next(),

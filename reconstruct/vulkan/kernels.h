@@ -21,7 +21,14 @@ constexpr std::uint32_t workgroups(std::size_t threads) {
   return static_cast<std::uint32_t>((threads + kWorkgroup - 1) / kWorkgroup);
 }
 
-enum Scalar : std::int32_t { kRho, kRhoBefore, kGamma, kNorm, kScalarCount };  // scalars.glsl
+enum Scalar : std::int32_t {
+  kRho,
+  kRhoBefore,
+  kGamma,
+  kNorm,
+  kSource,
+  kScalarCount
+};  // scalars.glsl
 
 /// The compiled shaders of reconstruct/shaders/.
 struct Kernels {
@@ -34,6 +41,8 @@ struct Kernels {
   gpu::Pipeline apply;
   gpu::Pipeline update;
   gpu::Pipeline reduce;
+  gpu::Pipeline fold;
+  gpu::Pipeline residual;
 
   static Result<Kernels> create(gpu::Context& context);
 };

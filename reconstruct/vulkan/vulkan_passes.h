@@ -4,10 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "gpu/commands.h"
 #include "reconstruct/diffusion/fluence_solver.h"
-#include "reconstruct/vulkan/device_fields.h"
-#include "reconstruct/vulkan/kernels.h"
+#include "reconstruct/vulkan/cycle.h"
 
 namespace opaline::reconstruct::vulkan {
 
@@ -33,44 +31,32 @@ class VulkanPasses {
                int first,
                int count);
 
-  int levels() const { return static_cast<int>(device_.levels.size()); }
+  int levels() const { return cycle_.levels(); }
   std::span<const double> true_residual();
-  void smooth_restrict(int level);
-  void prolong_smooth(int level);
-  void apply_dot(bool restart);
+  void smooth_restrict(int level) { cycle_.smooth_restrict(level); }
+  void prolong_smooth(int level) { cycle_.prolong_smooth(level); }
+  void apply_dot(bool restart) { cycle_.apply_dot(restart); }
   std::span<const double> update_norm();
 
-  const std::optional<Error>& error() const { return error_; }
-  /// Runs what was recorded; the solver need not, tests look at fields between passes.
-  void finish();
+  const std::optional<Error>& error() const { return recorder_.error(); }
   /// A field of one right-hand side as it stands on the device, unscaled.
   std::vector<double> read(const gpu::Buffer& field, int m);
 
  private:
-  using Buffers = std::initializer_list<const gpu::Buffer*>;
-  void start();
-  void dispatch(const gpu::Pipeline& kernel,
-                Buffers buffers,
-                const GridPush& push,
-                std::size_t threads);
-  void reduce(Scalar scalar, std::int32_t partials);
-  GridPush push_for(int level, int color = 0) const;
-  std::size_t colored_threads(int level) const;
   void fetch_correction();
   void send_residual(const std::vector<std::vector<double>>& residuals);
-  void fail(const Error& error);
   std::span<const double> not_a_number();
 
   Device device_;
+  Recorder recorder_;
+  Cycle cycle_;
   const diffusion::FieldBatch& b_;
   diffusion::FieldBatch& x_;
   int first_;
   std::size_t cells_;
   std::vector<double> scale_;
   std::vector<double> norms_;
-  bool recording_ = false;
   bool corrected_ = false;  // d may differ from zero
-  std::optional<Error> error_;
 };
 
 }  // namespace opaline::reconstruct::vulkan

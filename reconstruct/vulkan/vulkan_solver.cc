@@ -8,6 +8,7 @@
 #include "reconstruct/diffusion/conjugate_gradient.h"
 #include "reconstruct/diffusion/medium_check.h"
 #include "reconstruct/diffusion/reference_solver.h"
+#include "reconstruct/vulkan/vulkan_minimiser.h"
 #include "reconstruct/vulkan/vulkan_passes.h"
 
 namespace opaline::reconstruct::vulkan {
@@ -20,15 +21,6 @@ using diffusion::SolveOptions;
 using diffusion::SolveSummary;
 using diffusion::Termination;
 
-constexpr const char* kRemedy = "; back_end = \"host\" needs no GPU";
-
-/// The device's trouble, with what can be done about it.
-Error with_remedy(Error error) {
-  if (error.code == ErrorCode::kUnavailable || error.code == ErrorCode::kTimeout)
-    error.message += kRemedy;
-  return error.in("vulkan");
-}
-
 /// The worse of two turns' outcomes: what a caller should know of both.
 SolveSummary worse(const SolveSummary& a, const SolveSummary& b) {
   SolveSummary both = a.relative_residual >= b.relative_residual ? a : b;
@@ -36,7 +28,7 @@ SolveSummary worse(const SolveSummary& a, const SolveSummary& b) {
   return both;
 }
 
-class VulkanSolver final : public diffusion::FluenceSolver {
+class VulkanSolver final : public diffusion::FluenceSolver, public InversionEngine {
  public:
   VulkanSolver(std::unique_ptr<gpu::Context> context, Kernels kernels, gpu::Commands commands)
       : context_(std::move(context)),
@@ -48,6 +40,9 @@ class VulkanSolver final : public diffusion::FluenceSolver {
                              FieldBatch& phi,
                              const SolveOptions& options,
                              std::stop_token stop) override;
+  Result<std::unique_ptr<Minimiser>> begin(const ChannelProblem& problem,
+                                           const InverseOptions& options,
+                                           const LbfgsState& from) override;
   std::string description() const override {
     return "vulkan, " + context_->device().name + ", float32";
   }
@@ -68,6 +63,7 @@ class VulkanSolver final : public diffusion::FluenceSolver {
   std::vector<Level> levels_;
   std::vector<DeviceLevel> coefficients_;
   std::optional<DeviceFields> fields_;
+  std::optional<ModelKernels> model_;  // compiled with the first minimisation
 };
 
 Result<void> VulkanSolver::prepare(const Medium& medium) {
@@ -95,7 +91,7 @@ Result<void> VulkanSolver::fit(int count) {
   const int groups = std::min(wanted, groups_that_fit(context_->device(), block_.cell_count()));
   if (fields_ && fields_->groups == groups) return ok();
   fields_.reset();
-  auto made = DeviceFields::create(*context_, levels_, groups);
+  auto made = DeviceFields::create(*context_, levels_, groups, Staging::kField);
   if (!made) return with_remedy(made.error());
   fields_ = *std::move(made);
   return ok();
@@ -139,17 +135,44 @@ Result<SolveSummary> VulkanSolver::solve(const FieldBatch& b,
   return *all;
 }
 
+/// The minimisation takes the device to itself: a solve needs another prepare().
+Result<std::unique_ptr<Minimiser>> VulkanSolver::begin(const ChannelProblem& problem,
+                                                       const InverseOptions& options,
+                                                       const LbfgsState& from) {
+  if (options.method != Method::kLbfgs) return std::unique_ptr<Minimiser>();
+  fields_.reset();
+  levels_.clear();
+  coefficients_.clear();
+  if (!model_) {
+    auto compiled = ModelKernels::create(*context_);
+    if (!compiled) return with_remedy(compiled.error());
+    model_ = *std::move(compiled);
+  }
+  auto made =
+      VulkanMinimiser::create(*context_, commands_, kernels_, *model_, problem, options, from);
+  if (!made) return with_remedy(made.error());
+  return std::unique_ptr<Minimiser>(*std::move(made));
+}
+
 }  // namespace
 
-Result<std::unique_ptr<diffusion::FluenceSolver>> make_vulkan_solver(const VulkanOptions& options) {
+Result<VulkanBackEnd> make_vulkan_back_end(const VulkanOptions& options) {
   auto context = gpu::Context::create(options.gpu);
   if (!context) return with_remedy(context.error());
   auto kernels = Kernels::create(**context);
   if (!kernels) return with_remedy(kernels.error());
   auto commands = gpu::Commands::create(**context);
   if (!commands) return with_remedy(commands.error());
-  return std::make_unique<VulkanSolver>(
+  auto solver = std::make_unique<VulkanSolver>(
       *std::move(context), *std::move(kernels), *std::move(commands));
+  InversionEngine* engine = solver.get();
+  return VulkanBackEnd{std::move(solver), engine};
+}
+
+Result<std::unique_ptr<diffusion::FluenceSolver>> make_vulkan_solver(const VulkanOptions& options) {
+  auto made = make_vulkan_back_end(options);
+  if (!made) return made.error();
+  return std::move(made->solver);
 }
 
 bool real_gpu_available() {

@@ -5,6 +5,7 @@
 #include "base/result.h"
 #include "gpu/context.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/minimiser.h"
 
 namespace opaline::reconstruct::vulkan {
 
@@ -23,6 +24,15 @@ struct VulkanOptions {
 ///         does not hold the block, each with what can be done; kTimeout when the device hangs. After kUnavailable or
 ///         kTimeout make a new solver.
 Result<std::unique_ptr<diffusion::FluenceSolver>> make_vulkan_solver(const VulkanOptions& options);
+
+/// A solver, and the same device as an engine for whole minimisations by L-BFGS (vulkan_minimiser.h), which lives in the
+/// solver: solve, adjoint, gradient, objective and line search stay on the device, and between two submissions one block
+/// of scalars is read. One of the two works at a time.
+struct VulkanBackEnd {
+  std::unique_ptr<diffusion::FluenceSolver> solver;
+  InversionEngine* engine = nullptr;
+};
+Result<VulkanBackEnd> make_vulkan_back_end(const VulkanOptions& options);
 
 /// The part of automatic choice: whether a Vulkan device is here that is not a CPU in disguise.
 bool real_gpu_available();

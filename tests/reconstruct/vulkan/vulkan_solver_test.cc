@@ -73,7 +73,7 @@ TEST_P(VulkanPassesTest, ComputeWhatTheReferenceComputes) {
   ASSERT_TRUE(context);
   auto kernels = Kernels::create(**context);
   auto commands = gpu::Commands::create(**context);
-  auto fields = DeviceFields::create(**context, levels, 2);
+  auto fields = DeviceFields::create(**context, levels, 2, Staging::kField);
   ASSERT_TRUE(kernels && commands && fields);
   std::vector<DeviceLevel> coefficients;
   for (const auto& level : levels) {
