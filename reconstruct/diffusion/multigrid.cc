@@ -105,9 +105,8 @@ void add_finest_axis(const Medium& medium, int axis, Level& level, Parts& parts)
         });
 }
 
-std::pair<Level, Parts> finest(const Medium& medium) {
-  std::pair<Level, Parts> made;
-  auto& [level, parts] = made;
+Parts build_finest(const Medium& medium, Level& level) {
+  Parts parts;
   level.cells = medium.block.cells();
   parts.spacing = medium.block.spacing();
   allocate(level, parts);
@@ -115,7 +114,7 @@ std::pair<Level, Parts> finest(const Medium& medium) {
     parts.sink[c] = medium.block.cell_volume() * medium.absorption[c];
   for (int axis = 0; axis < 3; ++axis) add_finest_axis(medium, axis, level, parts);
   sum_diagonal(level, parts);
-  return made;
+  return parts;
 }
 
 std::array<int, 3> choose_ratio(const Level& level, const Parts& parts) {
@@ -220,6 +219,7 @@ void add_to_parents(const Level& fine,
 void coarsen_axis(Level& fine, const Parts& from, int axis, Level& coarse, Parts& parts) {
   const double* g = fine.conductance[axis].data();
   double* below = coarse.conductance[axis].data();
+  fine.transfer[axis].clear();
   if (fine.ratio[axis] == 2) {
     fine.transfer[axis].assign(fine.cell_count(), 0.0);
     for_each_face_run(fine, coarse, axis, [&](const FaceRun& run) {
@@ -252,9 +252,8 @@ void soften(Level& level, Parts& parts) {
     for (auto& side : walls) divide(side, kOvercorrection);
 }
 
-std::pair<Level, Parts> coarsen(Level& fine, const Parts& from) {
-  std::pair<Level, Parts> made;
-  auto& [coarse, parts] = made;
+Parts coarsen(Level& fine, const Parts& from, Level& coarse) {
+  Parts parts;
   for (int axis = 0; axis < 3; ++axis) {
     coarse.cells[axis] = (fine.cells[axis] + fine.ratio[axis] - 1) / fine.ratio[axis];
     parts.spacing[axis] = from.spacing[axis] * fine.ratio[axis];
@@ -265,23 +264,28 @@ std::pair<Level, Parts> coarsen(Level& fine, const Parts& from) {
   bound_weights(fine);
   soften(coarse, parts);
   sum_diagonal(coarse, parts);
-  return made;
+  return parts;
 }
 
 }  // namespace
 
 std::vector<Level> build_levels(const Medium& medium) {
   std::vector<Level> levels;
-  auto [level, parts] = finest(medium);
-  while (level.cell_count() > 1) {
-    level.ratio = choose_ratio(level, parts);
-    auto next = coarsen(level, parts);
-    levels.push_back(std::move(level));
-    level = std::move(next.first);
-    parts = std::move(next.second);
-  }
-  levels.push_back(std::move(level));
+  rebuild_levels(medium, levels);
   return levels;
+}
+
+void rebuild_levels(const Medium& medium, std::vector<Level>& levels) {
+  if (levels.empty()) levels.emplace_back();
+  std::size_t l = 0;
+  for (Parts parts = build_finest(medium, levels[0]); levels[l].cell_count() > 1; ++l) {
+    levels[l].ratio = choose_ratio(levels[l], parts);
+    if (l + 1 == levels.size()) levels.emplace_back();
+    parts = coarsen(levels[l], parts, levels[l + 1]);
+  }
+  levels.resize(l + 1);
+  levels[l].ratio = {1, 1, 1};
+  for (auto& weights : levels[l].transfer) weights.clear();
 }
 
 void residual(const Level& level, const double* b, const double* x, double* r) {

@@ -56,6 +56,8 @@ struct Level {
 ///
 /// `medium` must be valid (diffusion/medium_check.h).
 std::vector<Level> build_levels(const Medium& medium);
+/// The same into `levels`, whatever they held: their memory is used again.
+void rebuild_levels(const Medium& medium, std::vector<Level>& levels);
 
 /// Red cells have an even sum of indices, on every level.
 constexpr bool is_red(int i, int j, int k) { return (i + j + k) % 2 == 0; }

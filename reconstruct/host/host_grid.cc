@@ -27,103 +27,122 @@ Medium with_y_and_z_exchanged(const Medium& medium) {
           medium.boundary_a};
 }
 
-/// Hands out the arrays of a level, each with a plane and a cell of zeros in front.
+/// Where a level's arrays lie, each with a plane and a cell of zeros in front.
+template <class T>
 class Carver {
  public:
-  Carver(HostLevel& level, int arrays)
-      : guard_((level.row(0, 1) + 16) / 16 * 16),
+  Carver(HostLevel<T>& level, std::size_t arrays)
+      : level_(level),
+        guard_((level.row(0, 1) + 16) / 16 * 16),
         each_(guard_ + (level.cell_count() + 31) / 16 * 16) {
-    level.storage = Buffer<float>(each_ * arrays);
-    next_ = level.storage.data();
+    if (level.storage.size() != each_ * arrays) level.storage = Buffer<T>(each_ * arrays);
   }
-  float* next() { return std::exchange(next_, next_ + each_) + guard_; }
+  T* array(std::size_t n) { return level_.storage.data() + n * each_ + guard_; }
 
  private:
+  HostLevel<T>& level_;
   std::size_t guard_;
   std::size_t each_;
-  float* next_ = nullptr;
 };
 
-const float* rounded(Carver& carver, const std::vector<double>& values, double factor = 1.0) {
-  float* to = carver.next();
-  std::transform(values.begin(), values.end(), to, [factor](double v) {
-    return static_cast<float>(factor * v);
-  });
-  return to;
+/// factor times the values of cells begin ... end; zeros where there are none.
+template <class T>
+void round_values(
+    const std::vector<double>& values, double factor, std::size_t begin, std::size_t end, T* to) {
+  if (values.empty())
+    std::fill(to + begin, to + end, T{0});
+  else
+    for (std::size_t c = begin; c < end; ++c) to[c] = static_cast<T>(factor * values[c]);
 }
 
-const float* inverse_of(Carver& carver, const std::vector<double>& values, double factor) {
-  float* to = carver.next();
-  std::transform(values.begin(), values.end(), to, [factor](double v) {
-    return static_cast<float>(factor / v);
-  });
-  return to;
-}
-
-const float* own_weights(Carver& carver, const Level& level) {
-  float* to = carver.next();
-  std::fill_n(to, level.cell_count(), 1.0F);
+template <class T>
+void round_own(const Level& level, std::size_t begin, std::size_t end, T* own) {
+  std::fill(own + begin, own + end, T{1});
   for (const std::vector<double>& weights : level.transfer)
-    for (std::size_t c = 0; c < weights.size(); ++c) to[c] -= static_cast<float>(weights[c]);
-  return to;
+    for (std::size_t c = begin; c < std::min(end, weights.size()); ++c)
+      own[c] -= static_cast<T>(weights[c]);
 }
 
-/// The x weights, without those of the surface: there is no aggregate to reach.
-const float* x_weights(Carver& carver, const Level& level) {
-  const float* weights = rounded(carver, level.transfer[0]);
-  auto* at = const_cast<float*>(weights);
+/// Without the x weights of the surface: there is no aggregate to reach. begin starts a row.
+template <class T>
+void drop_surface_weights(const Level& level, std::size_t begin, std::size_t end, T* wx) {
   const auto nx = static_cast<std::size_t>(level.cells[0]);
-  for (std::size_t row = 0; level.ratio[0] == 2 && row < level.cell_count(); row += nx) {
-    at[row] = 0.0F;
-    if (nx % 2 == 0) at[row + nx - 1] = 0.0F;
+  for (std::size_t row = begin; level.ratio[0] == 2 && row < end; row += nx) {
+    wx[row] = T{0};
+    if (nx % 2 == 0) wx[row + nx - 1] = T{0};
   }
-  return weights;
 }
 
-const float* sinks(Carver& carver, const Level& level, double unit) {
-  std::vector<double> sink = level.diagonal;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<double>& g = level.conductance[axis];
-    const std::size_t stride = level.stride(axis);
-    for (std::size_t c = 0; c < sink.size(); ++c)
-      sink[c] -= g[c] + (c < stride ? 0.0 : g[c - stride]);
+template <class T>
+void round_diagonal(
+    const Level& level, double unit, std::size_t begin, std::size_t end, T* sink, T* inverse) {
+  for (std::size_t c = begin; c < end; ++c) {
+    double sum = level.diagonal[c];
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t stride = level.stride(axis);
+      sum -= level.conductance[axis][c] + (c < stride ? 0.0 : level.conductance[axis][c - stride]);
+    }
+    sink[c] = static_cast<T>(sum / unit);
+    inverse[c] = static_cast<T>(unit / level.diagonal[c]);
   }
-  return rounded(carver, sink, 1.0 / unit);
 }
 
-HostLevel round_level(const Level& level, double unit) {
-  HostLevel made;
+template <class T>
+void round_level(const Level& level, double unit, ThreadTeam& team, HostLevel<T>& made) {
   std::tie(made.nx, made.ni, made.no) = std::tuple_cat(level.cells);
   made.ratio = level.ratio;
-  Carver carver(made, 9);
-  made.gx = rounded(carver, level.conductance[0], 1.0 / unit);
-  made.gi = rounded(carver, level.conductance[1], 1.0 / unit);
-  made.go = rounded(carver, level.conductance[2], 1.0 / unit);
-  made.sink = sinks(carver, level, unit);
-  made.inverse = inverse_of(carver, level.diagonal, unit);
-  made.own = own_weights(carver, level);
-  made.wx = x_weights(carver, level);
-  made.wi = rounded(carver, level.transfer[1]);
-  made.wo = rounded(carver, level.transfer[2]);
-  return made;
+  Carver<T> carver(made, 9);
+  const std::array<const std::vector<double>*, 6> values{&level.conductance[0],
+                                                         &level.conductance[1],
+                                                         &level.conductance[2],
+                                                         &level.transfer[0],
+                                                         &level.transfer[1],
+                                                         &level.transfer[2]};
+  const auto rows = static_cast<std::size_t>(made.ni) * made.no;
+  const std::size_t parts = made.cell_count() > 4096 ? team.size() : 1;
+  const auto round = [&](std::size_t part) {
+    const std::size_t begin = rows * part / parts * made.nx;
+    const std::size_t end = rows * (part + 1) / parts * made.nx;
+    for (std::size_t n = 0; n < values.size(); ++n)
+      round_values(*values[n], n < 3 ? 1.0 / unit : 1.0, begin, end, carver.array(n));
+    drop_surface_weights(level, begin, end, carver.array(3));
+    round_own(level, begin, end, carver.array(6));
+    round_diagonal(level, unit, begin, end, carver.array(7), carver.array(8));
+  };
+  if (parts == 1)
+    round(0);
+  else
+    team.run([&](int thread) { round(static_cast<std::size_t>(thread)); });
+  const std::array<const T**, 9> arrays{&made.gx,
+                                        &made.gi,
+                                        &made.go,
+                                        &made.wx,
+                                        &made.wi,
+                                        &made.wo,
+                                        &made.own,
+                                        &made.sink,
+                                        &made.inverse};
+  for (std::size_t n = 0; n < arrays.size(); ++n) *arrays[n] = carver.array(n);
 }
 
 }  // namespace
 
-HostGrid build_host_grid(const Medium& medium) {
+template <class T>
+void build_host_grid(const Medium& medium, ThreadTeam& team, HostGrid<T>& grid) {
   const Block& block = medium.block;
   const bool exchange = block.ny > block.nz;
-  std::vector<Level> levels =
-      diffusion::build_levels(exchange ? with_y_and_z_exchanged(medium) : medium);
-  HostGrid grid;
+  diffusion::rebuild_levels(exchange ? with_y_and_z_exchanged(medium) : medium, grid.exact);
   const auto nx = static_cast<std::size_t>(block.nx);
   grid.inner_stride = exchange ? nx * block.ny : nx;
   grid.outer_stride = exchange ? nx : nx * block.ny;
-  const std::vector<double>& diagonal = levels.front().diagonal;
+  const std::vector<double>& diagonal = grid.exact.front().diagonal;
   grid.unit = *std::max_element(diagonal.begin(), diagonal.end());
-  for (const Level& level : levels) grid.levels.push_back(round_level(level, grid.unit));
-  grid.finest = std::move(levels.front());
-  return grid;
+  grid.levels.resize(grid.exact.size());
+  for (std::size_t l = 0; l < grid.levels.size(); ++l)
+    round_level(grid.exact[l], grid.unit, team, grid.levels[l]);
 }
+
+template void build_host_grid(const Medium&, ThreadTeam&, HostGrid<float>&);
+template void build_host_grid(const Medium&, ThreadTeam&, HostGrid<double>&);
 
 }  // namespace opaline::reconstruct::host

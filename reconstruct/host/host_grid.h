@@ -4,30 +4,32 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/thread_team.h"
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/diffusion/multigrid.h"
 #include "reconstruct/host/buffer.h"
 
 namespace opaline::reconstruct::host {
 
-/// One level's coefficients in single precision. Lines run along x, planes are made of lines along
+/// One level's coefficients in the precision that computes. Lines run along x, planes are made of lines along
 /// the inner axis, and threads share the planes along the outer axis. Reading one plane and one
 /// cell before the first is allowed (zeros).
+template <class T>
 struct HostLevel {
   int nx = 1;
   int ni = 1;
   int no = 1;
   std::array<int, 3> ratio{1, 1, 1};  ///< along x, inner, outer
-  const float* gx = nullptr;
-  const float* gi = nullptr;
-  const float* go = nullptr;
-  const float* sink = nullptr;     ///< c = D - sum g: absorption and boundary
-  const float* inverse = nullptr;  ///< 1 / D
-  const float* own = nullptr;      ///< transfer weights; null on the last level
-  const float* wx = nullptr;
-  const float* wi = nullptr;
-  const float* wo = nullptr;
-  Buffer<float> storage;
+  const T* gx = nullptr;
+  const T* gi = nullptr;
+  const T* go = nullptr;
+  const T* sink = nullptr;     ///< c = D - sum g: absorption and boundary
+  const T* inverse = nullptr;  ///< 1 / D
+  const T* own = nullptr;      ///< transfer weights; null on the last level
+  const T* wx = nullptr;
+  const T* wi = nullptr;
+  const T* wo = nullptr;
+  Buffer<T> storage;
 
   std::size_t row(int j, int k) const {
     return (static_cast<std::size_t>(k) * ni + j) * static_cast<std::size_t>(nx);
@@ -36,9 +38,10 @@ struct HostLevel {
 };
 
 /// A medium as the host's sweeps read it.
+template <class T>
 struct HostGrid {
-  diffusion::Level finest;        ///< in float64, axes x, inner, outer
-  std::vector<HostLevel> levels;  ///< of K / unit
+  std::vector<diffusion::Level> exact;  ///< in float64, axes x, inner, outer
+  std::vector<HostLevel<T>> levels;     ///< of K / unit
   double unit =
       1.0;  ///< the largest D of the finest level, so that single precision is in its middle
   std::size_t inner_stride = 1;  ///< of the caller's fields, in cells
@@ -47,7 +50,9 @@ struct HostGrid {
   std::size_t caller_row(int j, int k) const { return j * inner_stride + k * outer_stride; }
 };
 
-/// The longer of y and z becomes the outer axis. `medium` must be valid.
-HostGrid build_host_grid(const diffusion::Medium& medium);
+/// The longer of y and z becomes the outer axis. `medium` must be valid. Whatever `grid` held, its
+/// memory is used again. The team shares the work.
+template <class T>
+void build_host_grid(const diffusion::Medium& medium, ThreadTeam& team, HostGrid<T>& grid);
 
 }  // namespace opaline::reconstruct::host

@@ -9,46 +9,90 @@ namespace {
 constexpr int kRed = 0;
 constexpr int kBlack = 1;
 
-/// The first cell of a colour on line (j, k).
+/// The first cell of a colour on line (j, k), from an even cell on.
 int first_of(int colour, int j, int k) { return (j + k + colour) % 2; }
 
-bool inside(int plane, int begin, int end, int count) {
-  return plane >= std::max(begin, 0) && plane < std::min(end, count);
+bool inside(int at, int begin, int end, int count) {
+  return at >= std::max(begin, 0) && at < std::min(end, count);
+}
+
+/// The aggregates of the cells that a tile answers for.
+Range below(const Range& cells, int ratio) {
+  return {cells.begin / ratio,
+          (cells.end + ratio - 1) / ratio,
+          cells.low / ratio,
+          (cells.high + ratio - 1) / ratio};
 }
 
 }  // namespace
 
-HostPasses::HostPasses(ThreadTeam& team, const HostGrid& grid, Workspace& work, const Group& group)
+template <class T, class S>
+HostPasses<T, S>::HostPasses(ThreadTeam& team,
+                             const HostGrid<T>& grid,
+                             Workspace<T, S>& work,
+                             const Group& group)
     : team_(team),
       grid_(grid),
       work_(work),
       group_(group),
-      kernels_(row_kernels(work.width)),
+      kernels_(row_kernels<T, S>(work.width)),
+      fields_(field_kernels<T>()),
       width_(work.width),
       scale_(group.count),
+      growth_(work.width, 1.0),
       rho_(work.width, 0.0),
       rho_before_(work.width, 0.0),
+      swept_(work.width, 0.0),
       gamma_(work.width, 0.0),
       norms_(group.count, 0.0) {
+  factor_.fill(T{1});
   for (int m = 0; m < group.count; ++m)
     scale_[m] = group.b_norms[m] > 0.0 ? 1.0 / std::sqrt(group.b_norms[m]) : 0.0;
 }
 
-const float* HostPasses::row_or_zeros(const float* plane, const HostField& field, int j) const {
-  return plane != nullptr ? plane + j * field.row_size() : work_.zeros.data() + width_;
+template <class T, class S>
+template <class F>
+void HostPasses<T, S>::for_waves(int l, Slab slab, const F& f) {
+  const std::vector<Tile>& tiles = work_.tiles[l];
+  for (std::size_t n = 0; n < tiles.size(); ++n)
+    f(Wave{l, grid_.levels[l], tiles[n], n, work_.scratch[l][slab.thread], slab});
 }
 
-Stencil HostPasses::stencil(int l, const Planes& u, int j, int k) const {
-  const HostLevel& level = grid_.levels[l];
-  const HostField& shape = work_.z[l];
-  const std::size_t at = level.row(j, k);
+template <class T, class S>
+auto HostPasses<T, S>::around(const Wave& w, int k) const -> Planes {
+  const auto plane = [&](int at) {
+    return inside(at, 0, w.level.no, w.level.no) ? w.scratch.ring.plane(at % kRing) : nullptr;
+  };
+  return {plane(k - 1),
+          plane(k),
+          plane(k + 1),
+          w.scratch.ring.row_size(),
+          w.tile.inner.size(),
+          w.tile.x.low,
+          w.tile.inner.low};
+}
+
+template <class T, class S>
+T* HostPasses<T, S>::ring_row(const Wave& w, int j, int k) const {
+  return w.scratch.ring.row(j - w.tile.inner.low, k % kRing);
+}
+
+template <class T, class S>
+Stencil<T> HostPasses<T, S>::stencil(
+    const HostLevel<T>& level, const Planes& u, int j, int k, int x) const {
+  const auto row = [&](const T* plane, int at) -> const T* {
+    const int local = at - u.low_inner;
+    if (plane == nullptr || local < 0 || local >= u.rows) return work_.zeros.data() + width_;
+    return plane + local * u.row_size + static_cast<std::size_t>(x - u.low_x) * width_;
+  };
+  const std::size_t at = level.row(j, k) + x;
   const auto stride = static_cast<std::size_t>(level.nx);
   const std::size_t plane = stride * level.ni;
-  return {u.at + j * shape.row_size(),
-          row_or_zeros(j > 0 ? u.at : nullptr, shape, j - 1),
-          row_or_zeros(j + 1 < level.ni ? u.at : nullptr, shape, j + 1),
-          row_or_zeros(u.before, shape, j),
-          row_or_zeros(u.after, shape, j),
+  return {row(u.at, j),
+          row(u.at, j - 1),
+          row(u.at, j + 1),
+          row(u.before, j),
+          row(u.after, j),
           level.gx + at,
           level.gi + at - stride,
           level.gi + at,
@@ -56,75 +100,106 @@ Stencil HostPasses::stencil(int l, const Planes& u, int j, int k) const {
           level.go + at};
 }
 
-void HostPasses::scale_row(int l, float* z, int j, int k) {
-  const HostLevel& level = grid_.levels[l];
-  const HostField& r = work_.r[l];
-  kernels_.scale(z + j * r.row_size(),
-                 r.row(j, k),
-                 level.inverse + level.row(j, k),
+template <class T, class S>
+void HostPasses<T, S>::scale_row(const Wave& w, int j, int k) {
+  kernels_.scale(ring_row(w, j, k),
+                 work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                 w.level.inverse + w.level.row(j, k) + w.tile.x.low,
                  first_of(kRed, j, k),
-                 level.nx);
+                 w.tile.x.size());
 }
 
-void HostPasses::sweep_row(int l, float* z, const Planes& u, int j, int k, int colour) {
-  const HostLevel& level = grid_.levels[l];
-  const HostField& r = work_.r[l];
-  kernels_.sweep(z + j * r.row_size(),
-                 r.row(j, k),
-                 level.inverse + level.row(j, k),
-                 stencil(l, u, j, k),
+template <class T, class S>
+void HostPasses<T, S>::sweep_row(const Wave& w, int j, int k, int colour) {
+  kernels_.sweep(ring_row(w, j, k),
+                 work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                 w.level.inverse + w.level.row(j, k) + w.tile.x.low,
+                 stencil(w.level, around(w, k), j, k, w.tile.x.low),
                  first_of(colour, j, k),
-                 level.nx);
+                 w.tile.x.size());
 }
 
-void HostPasses::smooth_restrict(int l) {
-  for_slabs(work_.parts(l), grid_.levels[l + 1].no, [&](Slab coarse) { restrict_slab(l, coarse); });
+template <class T, class S>
+void HostPasses<T, S>::smooth_restrict(int l) {
+  for_slabs(work_.parts(l), grid_.levels[l + 1].no, [&](Slab coarse) {
+    for_waves(l, coarse, [&](const Wave& w) { restrict_wave(w); });
+  });
 }
 
-void HostPasses::restrict_slab(int l, Slab coarse) {
-  const HostLevel& level = grid_.levels[l];
-  HostField& below = work_.r[l + 1];
-  std::fill(below.plane(coarse.begin), below.plane(coarse.end), 0.0F);
-  HostField& ring = work_.scratch[l][coarse.thread];
-  const auto plane = [&](int k) {
-    return inside(k, 0, level.no, level.no) ? ring.plane(k % 4) : nullptr;
-  };
-  const auto around = [&](int k) { return Planes{plane(k - 1), plane(k), plane(k + 1)}; };
-  const int halo = level.ratio[2] == 2 ? 1 : 0;  // planes beyond the slab that reach into it
-  const int begin = coarse.begin * level.ratio[2] - halo;
-  const int end = std::min(level.no, coarse.end * level.ratio[2]) + halo;
+template <class T, class S>
+void HostPasses<T, S>::restrict_wave(const Wave& w) {
+  const int ratio = w.level.ratio[2];
+  const int halo = ratio - 1;  // planes beyond the slab that reach into it
+  const int begin = w.slab.begin * ratio - halo;
+  const int end = std::min(w.level.no, w.slab.end * ratio) + halo;
+  const Range& rows = w.tile.inner;
   for (int k = begin - 2; k < end + 2; ++k) {
-    const bool scales = inside(k, begin - 2, end + 2, level.no);
-    const bool sweeps = inside(k - 1, begin - 1, end + 1, level.no);
-    const bool restricts = inside(k - 2, begin, end, level.no);
-    for (int j = 0; j < level.ni; ++j) {
-      if (scales) scale_row(l, plane(k), j, k);
-      if (sweeps) sweep_row(l, plane(k - 1), around(k - 1), j, k - 1, kBlack);
-      if (restricts) restrict_row(l, around(k - 2), j, k - 2, coarse);
+    const bool scales = inside(k, begin - 2, end + 2, w.level.no);
+    const bool sweeps = inside(k - 1, begin - 1, end + 1, w.level.no);
+    const bool restricts = inside(k - 2, begin, end, w.level.no);
+    if (restricts) clear_below(w, k - 2);
+    for (int j = rows.low; j < rows.high; ++j) {
+      if (scales) scale_row(w, j, k);
+      if (sweeps) sweep_row(w, j, k - 1, kBlack);
+      if (restricts) restrict_row(w, j, k - 2);
     }
+    if (restricts) store_below(w, k - 2);
   }
 }
 
-void HostPasses::restrict_row(int l, const Planes& u, int j, int k, Slab coarse) {
-  const HostLevel& level = grid_.levels[l];
-  HostField& below = work_.r[l + 1];
-  float* discard = work_.discard[coarse.thread].data() + width_;
-  const Parents to = parents(l, j, k);
-  const bool own = coarse.has(to.k);
-  float* inner = own && to.has_inner ? below.row(to.j_side, to.k) : discard;
-  float* outer = to.has_outer && coarse.has(to.k_side) ? below.row(to.j, to.k_side) : discard;
-  kernels_.restrict_row(stencil(l, u, j, k),
-                        weights(l, j, k),
-                        own ? below.row(to.j, to.k) : discard,
-                        inner,
-                        outer,
-                        first_of(kRed, j, k),
-                        level.nx);
+template <class T, class S>
+void HostPasses<T, S>::clear_below(const Wave& w, int k) {
+  const bool paired = w.level.ratio[2] == 2;
+  if (paired && k % 2 == 0 && k > 0) return;
+  HostField<T>& sums = w.scratch.below;
+  const int plane = (paired ? (k + 1) / 2 : k) % kRing;
+  std::fill_n(sums.plane(plane), sums.plane_size(), T{0});
 }
 
-HostPasses::Parents HostPasses::parents(int l, int j, int k) const {
+template <class T, class S>
+void HostPasses<T, S>::store_below(const Wave& w, int k) {
+  const bool paired = w.level.ratio[2] == 2;
+  const auto store = [&](int plane) {
+    if (!w.slab.has(plane)) return;
+    const Range x = below(w.tile.x, w.level.ratio[0]);
+    const Range rows = below(w.tile.inner, w.level.ratio[1]);
+    for (int j = rows.begin; j < rows.end; ++j)
+      std::copy_n(w.scratch.below.cell(x.begin - x.low, j - rows.low, plane % kRing, width_),
+                  static_cast<std::size_t>(x.end - x.begin) * width_,
+                  work_.r[w.l + 1].cell(x.begin, j, plane, width_));
+  };
+  if (!paired) {
+    store(k);
+    return;
+  }
+  if (k % 2 == 0) store(k / 2 - 1);
+  if (k + 1 == w.level.no) store(k / 2);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::restrict_row(const Wave& w, int j, int k) {
+  const Parents to = parents(w.l, j, k);
+  const Range rows = below(w.tile.inner, w.level.ratio[1]);
+  T* discard = w.scratch.discard.data() + width_;
+  const auto row = [&](bool there, int at, int plane) {
+    if (!there || at < rows.begin || at >= rows.end || !w.slab.has(plane)) return discard;
+    return w.scratch.below.row(at - rows.low, plane % kRing);
+  };
+  const CoarseRows<T> sums{row(true, to.j, to.k),
+                           row(to.has_inner, to.j_side, to.k),
+                           row(to.has_outer, to.j, to.k_side)};
+  if (sums.own == discard && sums.inner == discard && sums.outer == discard) return;
+  kernels_.restrict_row(stencil(w.level, around(w, k), j, k, w.tile.x.low),
+                        weights(w, j, k),
+                        sums,
+                        first_of(kRed, j, k),
+                        w.tile.x.size());
+}
+
+template <class T, class S>
+auto HostPasses<T, S>::parents(int l, int j, int k) const -> Parents {
   const std::array<int, 3>& ratio = grid_.levels[l].ratio;
-  const HostLevel& next = grid_.levels[l + 1];
+  const HostLevel<T>& next = grid_.levels[l + 1];
   const int j_own = j / ratio[1];
   const int k_own = k / ratio[2];
   const int j_side = j % 2 == 1 ? j_own + 1 : j_own - 1;
@@ -137,154 +212,110 @@ HostPasses::Parents HostPasses::parents(int l, int j, int k) const {
           ratio[2] == 2 && inside(k_side, 0, next.no, next.no)};
 }
 
-Weights HostPasses::weights(int l, int j, int k) const {
-  const HostLevel& level = grid_.levels[l];
-  const std::size_t at = level.row(j, k);
-  return {level.own + at,
-          level.wx + at,
-          level.wi + at,
-          level.wo + at,
-          level.ratio[0],
-          grid_.levels[l + 1].nx};
+template <class T, class S>
+Weights<T> HostPasses<T, S>::weights(const Wave& w, int j, int k) const {
+  const std::size_t at = w.level.row(j, k) + w.tile.x.low;
+  return {w.level.own + at, w.level.wx + at, w.level.wi + at, w.level.wo + at, w.level.ratio[0]};
 }
 
-void HostPasses::prolong_smooth(int l) {
-  if (l == 0) rho_before_ = rho_;
-  for_slabs(work_.parts(l), grid_.levels[l].no, [&](Slab slab) { prolong_slab(l, slab); });
-  if (l == 0) total(rho_);
-}
-
-void HostPasses::prolong_slab(int l, Slab slab) {
-  const HostLevel& level = grid_.levels[l];
-  HostField& z = work_.z[l];
-  HostField& halo = work_.scratch[l][slab.thread];
-  const auto plane = [&](int k) -> float* {
-    if (!inside(k, 0, level.no, level.no)) return nullptr;
-    if (slab.has(k)) return z.plane(k);
-    return halo.plane(k < slab.begin ? k - slab.begin + 2 : k - slab.end + 2);
-  };
-  const auto around = [&](int k) { return Planes{plane(k - 1), plane(k), plane(k + 1)}; };
-  const bool last = l + 1 == levels();
-  for (int k = slab.begin - 2; k < slab.end + 2; ++k) {
-    const bool starts = inside(k, 0, level.no, level.no);
-    const bool sweeps = inside(k - 1, slab.begin - 1, slab.end + 1, level.no);
-    const bool ends = slab.has(k - 2);
-    if (ends && l == 0) clear_sums(k - 2);
-    for (int j = 0; j < level.ni; ++j) {
-      if (starts) last ? scale_row(l, plane(k), j, k) : prolong_row(l, plane(k), j, k);
-      if (sweeps) sweep_row(l, plane(k - 1), around(k - 1), j, k - 1, kBlack);
-      if (!ends) continue;
-      sweep_row(l, plane(k - 2), around(k - 2), j, k - 2, kRed);
-      if (l == 0) kernels_.dot(z.row(j, k - 2), work_.r[0].row(j, k - 2), sums(k - 2), level.nx);
-    }
-  }
-}
-
-void HostPasses::prolong_row(int l, float* z, int j, int k) {
-  const HostLevel& level = grid_.levels[l];
-  const HostField& above = work_.z[l + 1];
-  const HostField& r = work_.r[l];
-  const Parents from = parents(l, j, k);
-  kernels_.prolong(z + j * r.row_size(),
-                   r.row(j, k),
-                   level.inverse + level.row(j, k),
-                   weights(l, j, k),
-                   above.row(from.j, from.k),
-                   row_or_zeros(from.has_inner ? above.plane(from.k) : nullptr, above, from.j_side),
-                   row_or_zeros(from.has_outer ? above.plane(from.k_side) : nullptr, above, from.j),
-                   first_of(kRed, j, k),
-                   level.nx);
-}
-
-double* HostPasses::sums(int k) { return &work_.plane_sums[k * static_cast<std::size_t>(width_)]; }
-
-void HostPasses::clear_sums(int k) { std::fill_n(sums(k), width_, 0.0); }
-
-void HostPasses::total(std::vector<double>& sums) const {
-  std::fill(sums.begin(), sums.end(), 0.0);
-  for (std::size_t at = 0; at < work_.plane_sums.size(); ++at)
-    if (at % width_ < sums.size()) sums[at % width_] += work_.plane_sums[at];
-}
-
-void HostPasses::apply_dot(bool restart) {
-  for (int m = 0; m < width_; ++m)
-    beta_[m] = rho_before_[m] > 0.0 ? static_cast<float>(rho_[m] / rho_before_[m]) : 0.0F;
-  const int parts = work_.parts(0);
-  const int planes = grid_.levels[0].no;
-  const Direction mode = restart       ? Direction::kRestart
-                         : !step_      ? Direction::kKeep
-                         : correction_ ? Direction::kAdd
-                                       : Direction::kStore;
-  if (!restart && std::min(parts, planes) > 1)
-    for_slabs(parts, planes, [&](Slab slab) { combine_halo(slab); });
-  for_slabs(parts, planes, [&](Slab slab) { apply_slab(slab, mode); });
-  correction_ = correction_ || step_;
-  step_ = false;
-  total(gamma_);
-}
-
-void HostPasses::combine_halo(Slab slab) {
-  HostField& halo = work_.scratch[0][slab.thread];
-  const int halo_rows = grid_.levels[0].ni;
-  const auto combine = [&](int k, int slot) {
-    if (!inside(k, 0, grid_.levels[0].no, grid_.levels[0].no)) return;
-    for (int j = 0; j < halo_rows; ++j)
-      kernels_.combine(halo.row(j, slot),
-                       work_.z[0].row(j, k),
-                       work_.p.row(j, k),
-                       beta_.data(),
-                       grid_.levels[0].nx);
-  };
-  combine(slab.begin - 1, 0);
-  combine(slab.end, 1);
-}
-
-void HostPasses::apply_slab(Slab slab, Direction mode) {
-  const HostLevel& level = grid_.levels[0];
-  const HostField& halo = work_.scratch[0][slab.thread];
-  const HostField& beyond = mode == Direction::kRestart ? work_.z[0] : halo;
-  const auto plane = [&](int k) -> const float* {
-    if (!inside(k, 0, level.no, level.no)) return nullptr;
-    if (slab.has(k)) return work_.p.plane(k);
-    return beyond.plane(mode == Direction::kRestart ? k : k < slab.begin ? 0 : 1);
-  };
-  for (int k = slab.begin; k < slab.end + 1; ++k) {
-    const Planes u{plane(k - 2), plane(k - 1), plane(k)};
-    if (k > slab.begin) clear_sums(k - 1);
-    for (int j = 0; j < level.ni; ++j) {
-      if (k < slab.end)
-        kernels_.direction(mode,
-                           work_.p.row(j, k),
-                           work_.z[0].row(j, k),
-                           work_.d.row(j, k),
-                           alpha_.data(),
-                           beta_.data(),
-                           level.nx);
-      if (k > slab.begin)
-        kernels_.apply(work_.q.row(j, k - 1),
-                       level.sink + level.row(j, k - 1),
-                       stencil(0, u, j, k - 1),
-                       sums(k - 1),
-                       level.nx);
-    }
-  }
-}
-
-std::span<const double> HostPasses::update_norm() {
-  for (int m = 0; m < width_; ++m)
-    alpha_[m] = gamma_[m] > 0.0 ? static_cast<float>(rho_[m] / gamma_[m]) : 0.0F;
-  step_ = true;
-  for_slabs(work_.parts(0), grid_.levels[0].no, [&](Slab slab) {
-    for (int k = slab.begin; k < slab.end; ++k) {
-      clear_sums(k);
-      for (int j = 0; j < grid_.levels[0].ni; ++j)
-        kernels_.update(
-            work_.r[0].row(j, k), work_.q.row(j, k), alpha_.data(), sums(k), grid_.levels[0].nx);
-    }
+template <class T, class S>
+void HostPasses<T, S>::prolong_smooth(int l) {
+  for_slabs(work_.parts(l), grid_.levels[l].no, [&](Slab slab) {
+    for_waves(l, slab, [&](const Wave& w) { prolong_wave(w); });
   });
-  total(norms_);
-  for (int m = 0; m < group_.count; ++m) norms_[m] *= group_.b_norms[m];
-  return norms_;
+  if (l > 0) return;
+  rho_before_ = rho_;
+  total(work_.rho_sums, rho_);
+  total(work_.swept_sums, swept_);
 }
+
+template <class T, class S>
+void HostPasses<T, S>::prolong_wave(const Wave& w) {
+  const bool last = w.l + 1 == levels();
+  const int more = w.l == 0 ? 1 : 0;  // one plane on either side for z . K z
+  const int begin = w.slab.begin - more;
+  const int end = w.slab.end + more;
+  const Range& rows = w.tile.inner;
+  for (int k = begin - 2; k < end + 2; ++k) {
+    const bool starts = inside(k, 0, w.level.no, w.level.no);
+    const bool sweeps = inside(k - 1, begin - 1, end + 1, w.level.no);
+    const bool ends = inside(k - 2, begin, end, w.level.no);
+    const bool emits = w.slab.has(k - 2);
+    const bool sums = w.l == 0 && w.slab.has(k - 3);
+    if (emits && w.l == 0) clear_sums(k - 2, w.tile_index);
+    for (int j = rows.low; j < rows.high; ++j) {
+      if (starts) last ? scale_row(w, j, k) : prolong_row(w, j, k);
+      if (sweeps) sweep_row(w, j, k - 1, kBlack);
+      if (ends) sweep_row(w, j, k - 2, kRed);
+      if (j < rows.begin || j >= rows.end) continue;
+      if (emits) emit_row(w, j, k - 2);
+      if (sums) energy_row(w, j, k - 3);
+    }
+  }
+}
+
+template <class T, class S>
+void HostPasses<T, S>::prolong_row(const Wave& w, int j, int k) {
+  const Parents from = parents(w.l, j, k);
+  const HostField<S>& above = work_.z[w.l + 1];
+  const int x = w.tile.x.low / w.level.ratio[0];
+  const auto row = [&](bool there, int at, int plane) {
+    return there ? above.cell(x, at, plane, width_) : work_.stored_zeros.data() + width_;
+  };
+  kernels_.prolong(ring_row(w, j, k),
+                   work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                   w.level.inverse + w.level.row(j, k) + w.tile.x.low,
+                   weights(w, j, k),
+                   {row(true, from.j, from.k),
+                    row(from.has_inner, from.j_side, from.k),
+                    row(from.has_outer, from.j, from.k_side)},
+                   first_of(kRed, j, k),
+                   w.tile.x.size());
+}
+
+template <class T, class S>
+void HostPasses<T, S>::emit_row(const Wave& w, int j, int k) {
+  const Range& x = w.tile.x;
+  const std::size_t sums = sums_at(k, w.tile_index);
+  kernels_.emit(work_.z[w.l].cell(x.begin, j, k, width_),
+                ring_row(w, j, k) + static_cast<std::size_t>(x.begin - x.low) * width_,
+                work_.r[w.l].cell(x.begin, j, k, width_),
+                w.l == 0 ? &work_.rho_sums[sums] : nullptr,
+                w.l == 0 ? &work_.swept_sums[sums] : nullptr,
+                first_of(kRed, j, k),
+                x.end - x.begin);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::energy_row(const Wave& w, int j, int k) {
+  const Range& x = w.tile.x;
+  kernels_.energy(w.level.sink + w.level.row(j, k) + x.begin,
+                  stencil(w.level, around(w, k), j, k, x.begin),
+                  &work_.swept_sums[sums_at(k, w.tile_index)],
+                  first_of(kBlack, j, k),
+                  x.end - x.begin);
+}
+
+template <class T, class S>
+std::size_t HostPasses<T, S>::sums_at(int plane, std::size_t tile) const {
+  return (plane * work_.tiles.front().size() + tile) * width_;
+}
+
+template <class T, class S>
+void HostPasses<T, S>::clear_sums(int plane, std::size_t tile) {
+  for (auto* sums : {&work_.rho_sums, &work_.swept_sums, &work_.norm_sums})
+    std::fill_n(sums->data() + sums_at(plane, tile), width_, 0.0);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::total(const std::vector<double>& parts, std::vector<double>& sums) const {
+  std::fill(sums.begin(), sums.end(), 0.0);
+  for (std::size_t at = 0; at < parts.size(); ++at)
+    if (at % width_ < sums.size()) sums[at % width_] += parts[at];
+}
+
+template class HostPasses<float, float>;
+template class HostPasses<float, Half>;
+template class HostPasses<double, double>;
 
 }  // namespace opaline::reconstruct::host

@@ -50,14 +50,17 @@ double sum_of(const double* values, std::size_t count, F f) {
   return sums[0] + sums[1] + sums[2] + sums[3];
 }
 
+template <class T, class S>
 class HostSolver final : public diffusion::FluenceSolver {
  public:
-  explicit HostSolver(const HostOptions& options) : team_(thread_count(options)) {}
+  explicit HostSolver(const HostOptions& options)
+      : team_(thread_count(options)), precision_(options.precision) {}
 
   Result<void> prepare(const Medium& medium) override {
     if (Result<void> good = validate(medium); !good) return good;
     block_ = medium.block;
-    grid_ = build_host_grid(medium);
+    if (!grid_) grid_.emplace();
+    build_host_grid(medium, team_, *grid_);
     for (auto& work : work_)
       if (work && !work->fits(*grid_)) work.reset();
     return ok();
@@ -88,7 +91,10 @@ class HostSolver final : public diffusion::FluenceSolver {
   }
 
   std::string description() const override {
-    return fmt::format("host, {} threads, {}", team_.size(), instruction_set());
+    return fmt::format("host, {} threads, {}, {} precision",
+                       team_.size(),
+                       instruction_set(),
+                       to_string(precision_));
   }
 
  private:
@@ -121,19 +127,32 @@ class HostSolver final : public diffusion::FluenceSolver {
                            const SolveOptions& options,
                            const std::stop_token& stop) {
     const auto at = std::lower_bound(kWidths.begin(), kWidths.end(), group.count) - kWidths.begin();
-    std::optional<Workspace>& work = work_[at];
+    std::optional<Workspace<T, S>>& work = work_[at];
     if (!work) work.emplace(*grid_, kWidths[at], team_.size());
-    HostPasses passes(team_, *grid_, *work, group);
+    HostPasses<T, S> passes(team_, *grid_, *work, group);
     return conjugate_gradient(passes, group.b_norms, options, stop);
   }
 
   ThreadTeam team_;
+  Precision precision_;
   Block block_;
-  std::optional<HostGrid> grid_;
-  std::array<std::optional<Workspace>, kWidths.size()> work_;
+  std::optional<HostGrid<T>> grid_;
+  std::array<std::optional<Workspace<T, S>>, kWidths.size()> work_;
 };
 
 }  // namespace
+
+std::string_view to_string(Precision precision) {
+  switch (precision) {
+    case Precision::kHalf:
+      return "half";
+    case Precision::kDouble:
+      return "double";
+    case Precision::kSingle:
+      break;
+  }
+  return "single";
+}
 
 Result<void> validate(const HostOptions& options) {
   if (options.threads < 0 || options.threads > 1024)
@@ -143,7 +162,15 @@ Result<void> validate(const HostOptions& options) {
 }
 
 std::unique_ptr<diffusion::FluenceSolver> make_host_solver(const HostOptions& options) {
-  return std::make_unique<HostSolver>(options);
+  switch (options.precision) {
+    case Precision::kHalf:
+      return std::make_unique<HostSolver<float, Half>>(options);
+    case Precision::kDouble:
+      return std::make_unique<HostSolver<double, double>>(options);
+    case Precision::kSingle:
+      break;
+  }
+  return std::make_unique<HostSolver<float, float>>(options);
 }
 
 }  // namespace opaline::reconstruct::host

@@ -15,19 +15,26 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Cells between what is read and what is asked for: the processor does not foresee every other cell of a row.
 constexpr std::ptrdiff_t kAhead = 16;
 
-/// The right-hand sides of one cell: W floats in kCount registers.
-template <int W>
+/// The right-hand sides of one cell: W numbers in kCount registers.
+template <class T, int W>
 struct Lanes {
-  using D = hn::CappedTag<float, W>;
+  using D = hn::CappedTag<T, W>;
+  using H = hn::Rebind<hwy::float16_t, D>;
   using V = hn::Vec<D>;
   static constexpr std::ptrdiff_t kLanes = static_cast<std::ptrdiff_t>(hn::MaxLanes(D()));
   static constexpr int kCount = W / kLanes;
 
   V v[kCount];
 
-  static HWY_INLINE Lanes load(const float* at) {
+  static HWY_INLINE Lanes load(const T* at) {
     Lanes a;
     for (int n = 0; n < kCount; ++n) a.v[n] = hn::LoadU(D(), at + n * kLanes);
+    return a;
+  }
+  static HWY_INLINE Lanes load(const Half* at) {
+    const auto* from = reinterpret_cast<const hwy::float16_t*>(at);
+    Lanes a;
+    for (int n = 0; n < kCount; ++n) a.v[n] = hn::PromoteTo(D(), hn::LoadU(H(), from + n * kLanes));
     return a;
   }
   static HWY_INLINE Lanes zero() {
@@ -35,20 +42,31 @@ struct Lanes {
     for (int n = 0; n < kCount; ++n) a.v[n] = hn::Zero(D());
     return a;
   }
-  HWY_INLINE void store(float* at) const {
+  HWY_INLINE void store(T* at) const {
     for (int n = 0; n < kCount; ++n) hn::StoreU(v[n], D(), at + n * kLanes);
   }
-  /// += factor * (what lies at `at`), one factor for all lanes.
-  HWY_INLINE void add(float factor, const float* at) {
-    const V f = hn::Set(D(), factor);
-    for (int n = 0; n < kCount; ++n) v[n] = hn::MulAdd(f, hn::LoadU(D(), at + n * kLanes), v[n]);
+  HWY_INLINE void store(Half* at) const {
+    auto* to = reinterpret_cast<hwy::float16_t*>(at);
+    const V most = hn::Set(D(), T{65504});
+    for (int n = 0; n < kCount; ++n) {
+      const V within = hn::Max(hn::Neg(most), hn::Min(most, v[n]));
+      hn::StoreU(hn::DemoteTo(H(), within), H(), to + n * kLanes);
+    }
   }
-  HWY_INLINE void scale(float factor) {
+  /// += factor * a, one factor for all lanes.
+  HWY_INLINE void add(T factor, const Lanes& a) {
+    const V f = hn::Set(D(), factor);
+    for (int n = 0; n < kCount; ++n) v[n] = hn::MulAdd(f, a.v[n], v[n]);
+  }
+  HWY_INLINE void scale(T factor) {
     const V f = hn::Set(D(), factor);
     for (int n = 0; n < kCount; ++n) v[n] = hn::Mul(v[n], f);
   }
+  HWY_INLINE void scale(const Lanes& factor) {
+    for (int n = 0; n < kCount; ++n) v[n] = hn::Mul(v[n], factor.v[n]);
+  }
   /// += factor * (u - what lies at `at`).
-  HWY_INLINE void add_difference(float factor, const Lanes& u, const float* at) {
+  HWY_INLINE void add_difference(T factor, const Lanes& u, const T* at) {
     const V f = hn::Set(D(), factor);
     for (int n = 0; n < kCount; ++n)
       v[n] = hn::MulAdd(f, hn::Sub(u.v[n], hn::LoadU(D(), at + n * kLanes)), v[n]);
@@ -62,34 +80,38 @@ struct Lanes {
     for (int n = 0; n < kCount; ++n) v[n] = hn::NegMulAdd(a.v[n], b.v[n], v[n]);
   }
   /// factor * this, added to what lies at `at`.
-  HWY_INLINE void add_scaled_to(float* at, float factor) const {
+  HWY_INLINE void add_scaled_to(T* at, T factor) const {
     const V f = hn::Set(D(), factor);
     for (int n = 0; n < kCount; ++n)
       hn::StoreU(hn::MulAdd(f, v[n], hn::LoadU(D(), at + n * kLanes)), D(), at + n * kLanes);
   }
   HWY_INLINE void add_to(double* sum) const {
-    float values[W];
+    T values[W];
     store(values);
     for (int m = 0; m < W; ++m) sum[m] += static_cast<double>(values[m]);
   }
 };
 
 /// a += sum g u over the six neighbours of cell i.
-template <int W>
-HWY_INLINE void add_neighbours(Lanes<W>& a, const Stencil& s, std::ptrdiff_t i) {
+template <int W, class T>
+HWY_INLINE void add_neighbours(Lanes<T, W>& a, const Stencil<T>& s, std::ptrdiff_t i) {
+  using L = Lanes<T, W>;
   const std::ptrdiff_t at = i * W;
-  a.add(s.gx[i - 1], s.u + at - W);
-  a.add(s.gx[i], s.u + at + W);
-  a.add(s.gi_before[i], s.inner_before + at);
-  a.add(s.gi_after[i], s.inner_after + at);
-  a.add(s.go_before[i], s.outer_before + at);
-  a.add(s.go_after[i], s.outer_after + at);
+  a.add(s.gx[i - 1], L::load(s.u + at - W));
+  a.add(s.gx[i], L::load(s.u + at + W));
+  a.add(s.gi_before[i], L::load(s.inner_before + at));
+  a.add(s.gi_after[i], L::load(s.inner_after + at));
+  a.add(s.go_before[i], L::load(s.outer_before + at));
+  a.add(s.go_after[i], L::load(s.outer_after + at));
 }
 
 /// a += sum g (u_i - u) over the six neighbours of cell i. Subtracting first keeps single precision exact where u is
 /// smooth; D u - sum g u would lose as many digits as K is ill-conditioned.
-template <int W>
-HWY_INLINE void add_flows(Lanes<W>& a, const Lanes<W>& u, const Stencil& s, std::ptrdiff_t i) {
+template <int W, class T>
+HWY_INLINE void add_flows(Lanes<T, W>& a,
+                          const Lanes<T, W>& u,
+                          const Stencil<T>& s,
+                          std::ptrdiff_t i) {
   const std::ptrdiff_t at = i * W;
   a.add_difference(s.gx[i - 1], u, s.u + at - W);
   a.add_difference(s.gx[i], u, s.u + at + W);
@@ -99,46 +121,51 @@ HWY_INLINE void add_flows(Lanes<W>& a, const Lanes<W>& u, const Stencil& s, std:
   a.add_difference(s.go_after[i], u, s.outer_after + at);
 }
 
-template <int W>
+template <class T, class S, int W>
 struct Kernels {
-  using L = Lanes<W>;
+  using L = Lanes<T, W>;
 
-  static void scale(float* z, const float* r, const float* inverse, int first, int nx) {
+  /// Both colours: the wave comes for the other one a plane later.
+  static HWY_INLINE void prefetch_pair(const T* at) {
+    hwy::Prefetch(at);
+    hwy::Prefetch(at + W);
+  }
+
+  static void scale(T* z, const T* r, const T* inverse, int first, int nx) {
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      hwy::Prefetch(r + (i + kAhead) * W);
+      prefetch_pair(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
       a.store(z + i * W);
     }
   }
 
-  static void prolong(float* z,
-                      const float* r,
-                      const float* inverse,
-                      const Weights& w,
-                      const float* above,
-                      const float* inner,
-                      const float* outer,
+  static void prolong(T* z,
+                      const T* r,
+                      const T* inverse,
+                      const Weights<T>& weights,
+                      const CoarseRows<const S>& coarse,
                       int first,
                       int nx) {
+    const Weights<T> w = weights;
+    const CoarseRows<const S> e = coarse;
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
       const std::ptrdiff_t up = i / w.ratio_x;
       const std::ptrdiff_t beside = i % 2 == 1 ? up + 1 : up - 1;
-      hwy::Prefetch(r + (i + kAhead) * W);
+      prefetch_pair(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       a.scale(inverse[i]);
-      a.add(w.own[i], above + up * W);
-      a.add(w.wx[i], above + beside * W);
-      a.add(w.wi[i], inner + up * W);
-      a.add(w.wo[i], outer + up * W);
+      a.add(w.own[i], L::load(e.own + up * W));
+      a.add(w.wx[i], L::load(e.own + beside * W));
+      a.add(w.wi[i], L::load(e.inner + up * W));
+      a.add(w.wo[i], L::load(e.outer + up * W));
       a.store(z + i * W);
     }
   }
 
-  static void sweep(
-      float* z, const float* r, const float* inverse, const Stencil& s, int first, int nx) {
+  static void sweep(T* z, const T* r, const T* inverse, const Stencil<T>& rows, int first, int nx) {
+    const Stencil<T> s = rows;  // not to be read again after every store
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      hwy::Prefetch(r + (i + kAhead) * W);
       L a = L::load(r + i * W);
       add_neighbours<W>(a, s, i);
       a.scale(inverse[i]);
@@ -146,27 +173,57 @@ struct Kernels {
     }
   }
 
-  static void restrict_row(const Stencil& s,
-                           const Weights& w,
-                           float* below,
-                           float* inner,
-                           float* outer,
+  static void restrict_row(const Stencil<T>& rows,
+                           const Weights<T>& weights,
+                           const CoarseRows<T>& coarse,
                            int first,
                            int nx) {
+    const Weights<T> w = weights;
+    const CoarseRows<T> below = coarse;
+    const Stencil<T> s = rows;  // not to be read again after every store
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
       const std::ptrdiff_t down = i / w.ratio_x;
-      const std::ptrdiff_t beside = i % 2 == 1 ? HWY_MIN(down + 1, std::ptrdiff_t{w.coarse_nx} - 1)
-                                               : HWY_MAX(down - 1, std::ptrdiff_t{0});
+      const std::ptrdiff_t beside = i % 2 == 1 ? down + 1 : down - 1;
       L a = L::zero();
       add_neighbours<W>(a, s, i);
-      a.add_scaled_to(below + down * W, w.own[i]);
-      a.add_scaled_to(below + beside * W, w.wx[i]);
-      a.add_scaled_to(inner + down * W, w.wi[i]);
-      a.add_scaled_to(outer + down * W, w.wo[i]);
+      a.add_scaled_to(below.own + down * W, w.own[i]);
+      a.add_scaled_to(below.own + beside * W, w.wx[i]);
+      a.add_scaled_to(below.inner + down * W, w.wi[i]);
+      a.add_scaled_to(below.outer + down * W, w.wo[i]);
     }
   }
 
-  static void combine(float* out, const float* z, const float* p, const float* beta, int nx) {
+  static void emit(S* out, const T* z, const T* r, double* rho, double* swept, int first, int nx) {
+    if (rho == nullptr) {
+      for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(out + i * W);
+      return;
+    }
+    L even = L::zero();
+    L odd = L::zero();
+    for (std::ptrdiff_t i = 0; i < nx; ++i) {
+      const L a = L::load(z + i * W);
+      a.store(out + i * W);
+      (i % 2 == first ? even : odd).add(a, L::load(r + i * W));
+    }
+    even.add_to(swept);
+    even.add_to(rho);
+    odd.add_to(rho);
+  }
+
+  static void energy(const T* sink, const Stencil<T>& rows, double* sum, int first, int nx) {
+    const Stencil<T> s = rows;  // not to be read again after every store
+    L total = L::zero();
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      const L u = L::load(s.u + i * W);
+      L a = u;
+      a.scale(sink[i]);
+      add_flows<W>(a, u, s, i);
+      total.add(u, a);
+    }
+    total.add_to(sum);
+  }
+
+  static void combine(T* out, const S* z, const T* p, const T* beta, int nx) {
     const L b = L::load(beta);
     for (std::ptrdiff_t i = 0; i < nx; ++i) {
       L a = L::load(z + i * W);
@@ -175,138 +232,100 @@ struct Kernels {
     }
   }
 
-  static void direction(Direction mode,
-                        float* p,
-                        const float* z,
-                        float* d,
-                        const float* alpha,
-                        const float* beta,
-                        int nx) {
+  static void direction(
+      Direction mode, T* p, const S* z, T* d, const T* alpha, const T* beta, int nx) {
     const L step = L::load(alpha);
     if (mode == Direction::kRestart)
       for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(p + i * W);
-    if (mode == Direction::kStore || mode == Direction::kAdd)
+    if (mode == Direction::kKeep) combine(p, z, p, beta, nx);
+    if (mode == Direction::kStore || mode == Direction::kAdd) {
+      const L b = L::load(beta);
       for (std::ptrdiff_t i = 0; i < nx; ++i) {
+        const L before = L::load(p + i * W);
         L sum = mode == Direction::kAdd ? L::load(d + i * W) : L::zero();
-        sum.add(step, L::load(p + i * W));
+        sum.add(step, before);
         sum.store(d + i * W);
+        L a = L::load(z + i * W);
+        a.add(b, before);
+        a.store(p + i * W);
       }
-    if (mode != Direction::kRestart) combine(p, z, p, beta, nx);
+    }
   }
 
-  static void apply(float* q, const float* sink, const Stencil& s, double* sum, int nx) {
+  static void update(T* r,
+                     const T* sink,
+                     const Stencil<T>& rows,
+                     const T* alpha,
+                     const T* factor,
+                     double* sum,
+                     int nx) {
+    const Stencil<T> s = rows;  // not to be read again after every store
+    const L step = L::load(alpha);
+    const L f = L::load(factor);
     L total = L::zero();
     for (std::ptrdiff_t i = 0; i < nx; ++i) {
       const L u = L::load(s.u + i * W);
-      L a = u;
-      a.scale(sink[i]);
-      add_flows<W>(a, u, s, i);
-      a.store(q + i * W);
-      total.add(u, a);
-    }
-    total.add_to(sum);
-  }
-
-  static void update(float* r, const float* q, const float* alpha, double* sum, int nx) {
-    const L step = L::load(alpha);
-    L total = L::zero();
-    for (std::ptrdiff_t i = 0; i < nx; ++i) {
+      L q = u;
+      q.scale(sink[i]);
+      add_flows<W>(q, u, s, i);
       L a = L::load(r + i * W);
-      a.subtract(step, L::load(q + i * W));
+      a.subtract(step, q);
+      a.scale(f);
       a.store(r + i * W);
       total.add(a, a);
     }
     total.add_to(sum);
   }
 
-  static void dot(const float* a, const float* b, double* sum, int nx) {
-    L total = L::zero();
-    for (std::ptrdiff_t i = 0; i < nx; ++i) total.add(L::load(a + i * W), L::load(b + i * W));
-    total.add_to(sum);
-  }
-
-  static RowKernels table() {
-    return {scale, prolong, sweep, restrict_row, direction, combine, apply, update, dot};
+  static RowKernels<T, S> table() {
+    return {scale, prolong, sweep, restrict_row, emit, energy, direction, combine, update};
   }
 };
 
-RowKernels table(int width) {
+template <class T, class S>
+RowKernels<T, S> table(int width) {
   switch (width) {
     case 1:
-      return Kernels<1>::table();
+      return Kernels<T, S, 1>::table();
     case 4:
-      return Kernels<4>::table();
+      return Kernels<T, S, 4>::table();
     case 8:
-      return Kernels<8>::table();
+      return Kernels<T, S, 8>::table();
     default:
-      return Kernels<16>::table();
+      return Kernels<T, S, 16>::table();
   }
 }
+
+RowKernels<float, float> single_table(int width) { return table<float, float>(width); }
+RowKernels<float, Half> half_table(int width) { return table<float, Half>(width); }
+RowKernels<double, double> double_table(int width) { return table<double, double>(width); }
 
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
-
-/// Cells i ... i + Lanes(d) of a residual, all of which have neighbours along x.
-template <class D>
-HWY_INLINE hn::Vec<D> store_residual(D d, const LineResidual& l, int i, double* r) {
-  auto a =
-      hn::NegMulAdd(hn::LoadU(d, l.diagonal + i), hn::LoadU(d, l.x + i), hn::LoadU(d, l.b + i));
-  a = hn::MulAdd(hn::LoadU(d, l.gx + i - 1), hn::LoadU(d, l.x + i - 1), a);
-  a = hn::MulAdd(hn::LoadU(d, l.gx + i), hn::LoadU(d, l.x + i + 1), a);
-  if (l.inner_before != nullptr)
-    a = hn::MulAdd(hn::LoadU(d, l.gi_before + i), hn::LoadU(d, l.inner_before + i), a);
-  if (l.inner_after != nullptr)
-    a = hn::MulAdd(hn::LoadU(d, l.gi_after + i), hn::LoadU(d, l.inner_after + i), a);
-  if (l.outer_before != nullptr)
-    a = hn::MulAdd(hn::LoadU(d, l.go_before + i), hn::LoadU(d, l.outer_before + i), a);
-  if (l.outer_after != nullptr)
-    a = hn::MulAdd(hn::LoadU(d, l.go_after + i), hn::LoadU(d, l.outer_after + i), a);
-  hn::StoreU(a, d, r + i);
-  return a;
-}
-
-double residual_at_end(const LineResidual& l, int i, int nx) {
-  double a = l.b[i] - l.diagonal[i] * l.x[i];
-  if (i > 0) a += l.gx[i - 1] * l.x[i - 1];
-  if (i + 1 < nx) a += l.gx[i] * l.x[i + 1];
-  if (l.inner_before != nullptr) a += l.gi_before[i] * l.inner_before[i];
-  if (l.inner_after != nullptr) a += l.gi_after[i] * l.inner_after[i];
-  if (l.outer_before != nullptr) a += l.go_before[i] * l.outer_before[i];
-  if (l.outer_after != nullptr) a += l.go_after[i] * l.outer_after[i];
-  return a;
-}
-
-double line(const LineResidual& l, double* r, int nx) {
-  const hn::ScalableTag<double> d;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  r[0] = residual_at_end(l, 0, nx);
-  double ends = r[0] * r[0];
-  auto sum = hn::Zero(d);
-  int i = 1;
-  for (; i + step < nx; i += step) {
-    const auto a = store_residual(d, l, i, r);
-    sum = hn::MulAdd(a, a, sum);
-  }
-  for (; i < nx; ++i) {
-    r[i] = residual_at_end(l, i, nx);
-    ends += r[i] * r[i];
-  }
-  return ends + hn::GetLane(hn::SumOfLanes(d, sum));
-}
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace opaline::reconstruct::host {
-HWY_EXPORT(table);
+HWY_EXPORT(single_table);
+HWY_EXPORT(half_table);
+HWY_EXPORT(double_table);
 HWY_EXPORT(target_name);
-HWY_EXPORT(line);
 
-RowKernels row_kernels(int width) { return HWY_DYNAMIC_DISPATCH(table)(width); }
-const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
-double line_residual(const LineResidual& l, double* r, int nx) {
-  return HWY_DYNAMIC_DISPATCH(line)(l, r, nx);
+template <>
+RowKernels<float, float> row_kernels(int width) {
+  return HWY_DYNAMIC_DISPATCH(single_table)(width);
 }
+template <>
+RowKernels<float, Half> row_kernels(int width) {
+  return HWY_DYNAMIC_DISPATCH(half_table)(width);
+}
+template <>
+RowKernels<double, double> row_kernels(int width) {
+  return HWY_DYNAMIC_DISPATCH(double_table)(width);
+}
+
+const char* instruction_set() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
 
 }  // namespace opaline::reconstruct::host
 #endif

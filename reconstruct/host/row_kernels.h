@@ -5,106 +5,98 @@
 
 namespace opaline::reconstruct::host {
 
+/// IEEE 754 binary16 as it lies in memory. Numbers that are too large for it are stored as +-65504.
+struct Half {
+  std::uint16_t bits = 0;
+};
+
 /// What the sweeps do to one grid line along x. Fields hold `width` right-hand sides of a cell side
 /// by side, then the next cell; a coefficient is one number a cell, shared by all of them. Fields
-/// have a cell of zeros on either side of each row; rows outside the grid are rows of zeros.
+/// have a cell on either side of each row that may be read; rows outside the grid are rows of zeros.
 ///
 /// K, g, D, w as in diffusion/multigrid.h. before and after: the neighbours at the lower and the
-/// higher index.
+/// higher index. T computes; S is how z lies in memory between two passes.
 
 /// u and the four rows around it, with the conductances of the faces: gx[i] joins cell i to i + 1.
+template <class T>
 struct Stencil {
-  const float* u;
-  const float* inner_before;
-  const float* inner_after;
-  const float* outer_before;
-  const float* outer_after;
-  const float* gx;
-  const float* gi_before;
-  const float* gi_after;
-  const float* go_before;
-  const float* go_after;
+  const T* u;
+  const T* inner_before;
+  const T* inner_after;
+  const T* outer_before;
+  const T* outer_after;
+  const T* gx;
+  const T* gi_before;
+  const T* gi_after;
+  const T* go_before;
+  const T* go_after;
 };
 
 /// The transfer weights of one fine row: own = 1 - sum w. wx is zero where there is no aggregate
 /// beside.
+template <class T>
 struct Weights {
-  const float* own;
-  const float* wx;
-  const float* wi;
-  const float* wo;
+  const T* own;
+  const T* wx;
+  const T* wi;
+  const T* wo;
   int ratio_x;  ///< 1 or 2
-  int coarse_nx;
+};
+
+/// The three rows of the next level that a fine row's weights belong to.
+template <class T>
+struct CoarseRows {
+  T* own;
+  T* inner;
+  T* outer;
 };
 
 /// kRestart: p = z. kKeep: p = z + beta p. kStore: the same after d = alpha p. kAdd: after d +=
 /// alpha p.
 enum class Direction : std::uint8_t { kRestart, kKeep, kStore, kAdd };
 
+template <class T, class S>
 struct RowKernels {
   /// z = r / D in every other cell from `first`.
-  void (*scale)(float* z, const float* r, const float* inverse, int first, int nx);
-  /// z = r / D + P e in every other cell; above, inner, outer: the rows of e that the weights
-  /// belong to.
-  void (*prolong)(float* z,
-                  const float* r,
-                  const float* inverse,
-                  const Weights& w,
-                  const float* above,
-                  const float* inner,
-                  const float* outer,
+  void (*scale)(T* z, const T* r, const T* inverse, int first, int nx);
+  /// z = r / D + P e in every other cell.
+  void (*prolong)(T* z,
+                  const T* r,
+                  const T* inverse,
+                  const Weights<T>& w,
+                  const CoarseRows<const S>& e,
                   int first,
                   int nx);
   /// z = (r + sum g z) / D in every other cell; s.u is z.
-  void (*sweep)(
-      float* z, const float* r, const float* inverse, const Stencil& s, int first, int nx);
-  /// Adds P^T (sum g z) of every other cell to the three rows below.
-  void (*restrict_row)(const Stencil& s,
-                       const Weights& w,
-                       float* below,
-                       float* inner,
-                       float* outer,
-                       int first,
-                       int nx);
-  void (*direction)(Direction mode,
-                    float* p,
-                    const float* z,
-                    float* d,
-                    const float* alpha,
-                    const float* beta,
-                    int nx);
+  void (*sweep)(T* z, const T* r, const T* inverse, const Stencil<T>& s, int first, int nx);
+  /// Adds P^T (sum g z) of every other cell to the rows below.
+  void (*restrict_row)(
+      const Stencil<T>& s, const Weights<T>& w, const CoarseRows<T>& below, int first, int nx);
+  /// out = z; rho += z . r; swept += the part of rho in every other cell from `first`. The sums may
+  /// both be null.
+  void (*emit)(S* out, const T* z, const T* r, double* rho, double* swept, int first, int nx);
+  /// sum += z . K z over every other cell.
+  void (*energy)(const T* sink, const Stencil<T>& s, double* sum, int first, int nx);
+  void (*direction)(Direction mode, T* p, const S* z, T* d, const T* alpha, const T* beta, int nx);
   /// out = z + beta p.
-  void (*combine)(float* out, const float* z, const float* p, const float* beta, int nx);
-  /// q = K u = c u_i + sum g (u_i - u), c = D - sum g; sum += u . q, one sum a right-hand side.
-  void (*apply)(float* q, const float* sink, const Stencil& s, double* sum, int nx);
-  /// r -= alpha q; sum += r . r.
-  void (*update)(float* r, const float* q, const float* alpha, double* sum, int nx);
-  /// sum += a . b.
-  void (*dot)(const float* a, const float* b, double* sum, int nx);
+  void (*combine)(T* out, const S* z, const T* p, const T* beta, int nx);
+  /// r = factor (r - alpha K p), K p = c p_i + sum g (p_i - p), c = D - sum g; sum += r . r, one sum
+  /// a right-hand side; s.u is p.
+  void (*update)(T* r,
+                 const T* sink,
+                 const Stencil<T>& s,
+                 const T* alpha,
+                 const T* factor,
+                 double* sum,
+                 int nx);
 };
 
-/// Width 1, 4, 8 or 16, for the best instruction set of this processor.
-RowKernels row_kernels(int width);
+/// Width 1, 4, 8 or 16, for the best instruction set of this processor. T and S: float and float,
+/// float and Half, double and double.
+template <class T, class S>
+RowKernels<T, S> row_kernels(int width);
 
 /// "AVX2", as Highway names it.
 const char* instruction_set();
-
-/// One line of one field in float64; rows of x outside the grid are null.
-struct LineResidual {
-  const double* b;
-  const double* x;
-  const double* inner_before;
-  const double* inner_after;
-  const double* outer_before;
-  const double* outer_after;
-  const double* diagonal;
-  const double* gx;
-  const double* gi_before;
-  const double* gi_after;
-  const double* go_before;
-  const double* go_after;
-};
-/// r = b - K x along the line; returns r . r.
-double line_residual(const LineResidual& line, double* r, int nx);
 
 }  // namespace opaline::reconstruct::host

@@ -1,0 +1,221 @@
+#include "reconstruct/host/field_kernels.h"
+
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "reconstruct/host/field_kernels.cc"
+#include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace opaline::reconstruct::host::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::ScalableTag<double>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+HWY_INLINE void store(V a, double* at) { hn::StoreU(a, D(), at); }
+HWY_INLINE void store(V a, float* at) {
+  const hn::Rebind<float, D> f;
+  hn::StoreU(hn::DemoteTo(f, a), f, at);
+}
+HWY_INLINE V load(const double* at) { return hn::LoadU(D(), at); }
+HWY_INLINE V load(const float* at) {
+  return hn::PromoteTo(D(), hn::LoadU(hn::Rebind<float, D>(), at));
+}
+
+/// b - K x in the cells of the mask from i >= 1 on; those of `inner` have a cell after them.
+HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M inner) {
+  const D d;
+  const auto at = [&](const double* row) { return hn::MaskedLoad(cells, d, row + i); };
+  V a = at(l.b);
+  if (l.x == nullptr) return a;
+  a = hn::NegMulAdd(at(l.diagonal), at(l.x), a);
+  a = hn::MulAdd(at(l.gx - 1), at(l.x - 1), a);
+  a = hn::MulAdd(at(l.gx), hn::MaskedLoad(inner, d, l.x + i + 1), a);
+  if (l.inner_before != nullptr) a = hn::MulAdd(at(l.gi_before), at(l.inner_before), a);
+  if (l.inner_after != nullptr) a = hn::MulAdd(at(l.gi_after), at(l.inner_after), a);
+  if (l.outer_before != nullptr) a = hn::MulAdd(at(l.go_before), at(l.outer_before), a);
+  if (l.outer_after != nullptr) a = hn::MulAdd(at(l.go_after), at(l.outer_after), a);
+  return a;
+}
+
+double residual_at_first(const FieldLine& l, int nx) {
+  if (l.x == nullptr) return l.b[0];
+  double a = l.b[0] - l.diagonal[0] * l.x[0];
+  if (nx > 1) a += l.gx[0] * l.x[1];
+  if (l.inner_before != nullptr) a += l.gi_before[0] * l.inner_before[0];
+  if (l.inner_after != nullptr) a += l.gi_after[0] * l.inner_after[0];
+  if (l.outer_before != nullptr) a += l.go_before[0] * l.outer_before[0];
+  if (l.outer_after != nullptr) a += l.go_after[0] * l.outer_after[0];
+  return a;
+}
+
+template <class T>
+double residual(const FieldLine& line, const double* next, double scale, T* r, int nx) {
+  const FieldLine l = line;  // not to be read again after every store
+  const D d;
+  const auto step = static_cast<int>(hn::Lanes(d));
+  const V factor = hn::Set(d, scale);
+  const double first = residual_at_first(l, nx);
+  r[0] = static_cast<T>(scale * first);
+  V sum = hn::Zero(d);
+  const M all = hn::FirstN(d, static_cast<std::size_t>(step));
+  for (int i = 1; i < nx; i += step) {
+    hwy::Prefetch(next + i);
+    if (l.outer_after != nullptr) hwy::Prefetch(l.outer_after + (next - l.b) + i);
+    const bool whole = i + step < nx;
+    const M cells = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - i));
+    const M inner = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - 1 - i));
+    const V a = residual_at(l, i, cells, inner);
+    sum = hn::MulAdd(a, a, sum);
+    store(hn::Mul(a, factor), r + i);
+  }
+  return first * first + hn::GetLane(hn::SumOfLanes(d, sum));
+}
+
+template <class T>
+void add(double* x, const double* next, const T* c, double factor, int nx) {
+  const D d;
+  const auto step = static_cast<int>(hn::Lanes(d));
+  const V f = hn::Set(d, factor);
+  int i = 0;
+  for (; i + step <= nx; i += step) {
+    hwy::Prefetch(next + i);
+    hn::StoreU(hn::MulAdd(f, load(c + i), hn::LoadU(d, x + i)), d, x + i);
+  }
+  for (; i < nx; ++i) x[i] += factor * static_cast<double>(c[i]);
+}
+
+template <class T>
+void to_fields_from(const T* d,
+                    const T* p,
+                    const T* step,
+                    T* fields,
+                    std::size_t stride,
+                    int width,
+                    int first,
+                    int nx) {
+  for (std::ptrdiff_t i = first; i < nx; ++i)
+    for (std::ptrdiff_t m = 0; m < width; ++m)
+      fields[m * stride + i] =
+          (d != nullptr ? d[i * width + m] : T{0}) + step[m] * p[i * width + m];
+}
+
+void to_fields(const double* d,
+               const double* p,
+               const double* step,
+               double* fields,
+               std::size_t stride,
+               int width,
+               int nx) {
+  to_fields_from(d, p, step, fields, stride, width, 0, nx);
+}
+
+template <class T>
+void to_lanes_from(const T* fields, std::size_t stride, T* lanes, int width, int first, int nx) {
+  for (std::ptrdiff_t i = first; i < nx; ++i)
+    for (std::ptrdiff_t m = 0; m < width; ++m) lanes[i * width + m] = fields[m * stride + i];
+}
+
+void to_lanes(const double* fields, std::size_t stride, double* lanes, int width, int nx) {
+  to_lanes_from(fields, stride, lanes, width, 0, nx);
+}
+
+#if HWY_TARGET == HWY_SCALAR
+void to_fields(const float* d,
+               const float* p,
+               const float* step,
+               float* fields,
+               std::size_t stride,
+               int width,
+               int nx) {
+  to_fields_from(d, p, step, fields, stride, width, 0, nx);
+}
+
+void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, int nx) {
+  to_lanes_from(fields, stride, lanes, width, 0, nx);
+}
+#else
+using Four = hn::FixedTag<float, 4>;
+struct Square {
+  hn::Vec<Four> row[4];
+};
+
+HWY_INLINE Square transposed(const Square& s) {
+  const Four f;
+  const auto low01 = hn::InterleaveLower(f, s.row[0], s.row[1]);
+  const auto low23 = hn::InterleaveLower(f, s.row[2], s.row[3]);
+  const auto high01 = hn::InterleaveUpper(f, s.row[0], s.row[1]);
+  const auto high23 = hn::InterleaveUpper(f, s.row[2], s.row[3]);
+  return {{hn::ConcatLowerLower(f, low23, low01),
+           hn::ConcatUpperUpper(f, low23, low01),
+           hn::ConcatLowerLower(f, high23, high01),
+           hn::ConcatUpperUpper(f, high23, high01)}};
+}
+
+void to_fields(const float* d,
+               const float* p,
+               const float* step,
+               float* fields,
+               std::size_t stride,
+               int width,
+               int nx) {
+  const Four f;
+  const int whole = width % 4 == 0 ? nx / 4 * 4 : 0;
+  for (std::ptrdiff_t i = 0; i < whole; i += 4)
+    for (std::ptrdiff_t m = 0; m < width; m += 4) {
+      const auto length = hn::LoadU(f, step + m);
+      Square s;
+      for (std::ptrdiff_t n = 0; n < 4; ++n) {
+        const std::ptrdiff_t at = (i + n) * width + m;
+        const auto sum = d != nullptr ? hn::LoadU(f, d + at) : hn::Zero(f);
+        s.row[n] = hn::MulAdd(length, hn::LoadU(f, p + at), sum);
+      }
+      s = transposed(s);
+      for (std::ptrdiff_t n = 0; n < 4; ++n)
+        hn::StoreU(s.row[n], f, fields + (m + n) * static_cast<std::ptrdiff_t>(stride) + i);
+    }
+  to_fields_from(d, p, step, fields, stride, width, whole, nx);
+}
+
+void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, int nx) {
+  const Four f;
+  const int whole = width % 4 == 0 ? nx / 4 * 4 : 0;
+  for (std::ptrdiff_t i = 0; i < whole; i += 4)
+    for (std::ptrdiff_t m = 0; m < width; m += 4) {
+      Square s;
+      for (std::ptrdiff_t n = 0; n < 4; ++n)
+        s.row[n] = hn::LoadU(f, fields + (m + n) * static_cast<std::ptrdiff_t>(stride) + i);
+      s = transposed(s);
+      for (std::ptrdiff_t n = 0; n < 4; ++n) hn::StoreU(s.row[n], f, lanes + (i + n) * width + m);
+    }
+  to_lanes_from(fields, stride, lanes, width, whole, nx);
+}
+#endif
+
+FieldKernels<float> single_kernels() { return {residual<float>, add<float>, to_fields, to_lanes}; }
+FieldKernels<double> double_kernels() {
+  return {residual<double>, add<double>, to_fields, to_lanes};
+}
+
+}  // namespace opaline::reconstruct::host::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace opaline::reconstruct::host {
+HWY_EXPORT(single_kernels);
+HWY_EXPORT(double_kernels);
+
+template <>
+FieldKernels<float> field_kernels() {
+  return HWY_DYNAMIC_DISPATCH(single_kernels)();
+}
+template <>
+FieldKernels<double> field_kernels() {
+  return HWY_DYNAMIC_DISPATCH(double_kernels)();
+}
+
+}  // namespace opaline::reconstruct::host
+#endif

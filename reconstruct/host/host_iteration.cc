@@ -1,0 +1,122 @@
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/host/host_passes.h"
+
+// What HostPasses does to the finest level once an iteration.
+namespace opaline::reconstruct::host {
+namespace {
+
+constexpr double kTrusted =
+    1e-3;  // share of z . K z below which the recurrence of p . K p is noise
+
+}  // namespace
+
+template <class T, class S>
+void HostPasses<T, S>::apply_dot(bool restart) {
+  restart_ = restart;
+  for (int m = 0; m < width_; ++m) {
+    const double before = rho_before_[m] * static_cast<double>(factor_[m]);
+    double beta = !restart && before > 0.0 ? rho_[m] / before : 0.0;
+    double gamma = swept_[m] - beta * beta * gamma_[m];
+    if (gamma < kTrusted * swept_[m]) {
+      beta = 0.0;
+      gamma = swept_[m];
+    }
+    beta_[m] = static_cast<T>(beta);
+    gamma_[m] = gamma;
+  }
+}
+
+template <class T, class S>
+std::span<const double> HostPasses<T, S>::update_norm() {
+  const int parts = work_.parts(0);
+  const int planes = grid_.levels[0].no;
+  const Direction mode = restart_      ? Direction::kRestart
+                         : !step_      ? Direction::kKeep
+                         : correction_ ? Direction::kAdd
+                                       : Direction::kStore;
+  for (int m = 0; m < width_; ++m)
+    alpha_[m] = gamma_[m] > 0.0 ? static_cast<T>(rho_[m] / gamma_[m]) : T{0};
+  rescale();
+  if (std::min(parts, planes) > 1) for_slabs(parts, planes, [&](Slab slab) { combine_halo(slab); });
+  for_slabs(parts, planes, [&](Slab slab) { update_slab(slab, mode); });
+  correction_ = correction_ || step_;
+  step_ = true;
+  for (int m = 0; m < width_; ++m) {
+    step_length_[m] = static_cast<T>(static_cast<double>(alpha_[m]) / growth_[m]);
+    growth_[m] *= static_cast<double>(factor_[m]);
+  }
+  total(work_.norm_sums, norms_);
+  for (int m = 0; m < group_.count; ++m) norms_[m] *= group_.b_norms[m] / (growth_[m] * growth_[m]);
+  return norms_;
+}
+
+template <class T, class S>
+void HostPasses<T, S>::rescale() {
+  constexpr double kMostGrowth = 0x1p60;
+  for (int m = 0; m < group_.count; ++m) {
+    const double stored = std::sqrt(norms_[m]) * scale_[m] * growth_[m];
+    const bool usable = std::isfinite(stored) && stored > 1.0 / kMostGrowth;
+    const double wanted = usable ? std::exp2(-std::round(std::log2(stored))) : 1.0;
+    factor_[m] = static_cast<T>(growth_[m] * wanted <= kMostGrowth ? wanted : 1.0);
+  }
+}
+
+template <class T, class S>
+void HostPasses<T, S>::combine_halo(Slab slab) {
+  const HostLevel<T>& level = grid_.levels[0];
+  HostField<T>& halo = work_.halo[slab.thread];
+  const auto combine = [&](int k, int slot) {
+    if (k < 0 || k >= level.no) return;
+    for (int j = 0; j < level.ni; ++j) {
+      const S* z = work_.z[0].row(j, k);
+      T* out = halo.row(j, slot);
+      if (restart_)
+        kernels_.direction(
+            Direction::kRestart, out, z, nullptr, alpha_.data(), beta_.data(), level.nx);
+      else
+        kernels_.combine(out, z, work_.p.row(j, k), beta_.data(), level.nx);
+    }
+  };
+  combine(slab.begin - 1, 0);
+  combine(slab.end, 1);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::update_slab(Slab slab, Direction mode) {
+  const HostLevel<T>& level = grid_.levels[0];
+  const auto plane = [&](int k) -> const T* {
+    if (k < 0 || k >= level.no) return nullptr;
+    if (slab.has(k)) return work_.p.plane(k);
+    return work_.halo[slab.thread].plane(k < slab.begin ? 0 : 1);
+  };
+  for (int k = slab.begin; k < slab.end + 1; ++k) {
+    const Planes u{plane(k - 2), plane(k - 1), plane(k), work_.p.row_size(), level.ni, 0, 0};
+    if (k > slab.begin) clear_sums(k - 1, 0);
+    for (int j = 0; j < level.ni; ++j) {
+      if (k < slab.end)
+        kernels_.direction(mode,
+                           work_.p.row(j, k),
+                           work_.z[0].row(j, k),
+                           work_.d.row(j, k),
+                           step_length_.data(),
+                           beta_.data(),
+                           level.nx);
+      if (k > slab.begin)
+        kernels_.update(work_.r[0].row(j, k - 1),
+                        level.sink + level.row(j, k - 1),
+                        stencil(level, u, j, k - 1, 0),
+                        alpha_.data(),
+                        factor_.data(),
+                        &work_.norm_sums[sums_at(k - 1, 0)],
+                        level.nx);
+    }
+  }
+}
+
+template class HostPasses<float, float>;
+template class HostPasses<float, Half>;
+template class HostPasses<double, double>;
+
+}  // namespace opaline::reconstruct::host
