@@ -23,6 +23,8 @@ constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 2> kMethodNames{"lbfgs", "as_published"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
+constexpr std::array<std::string_view, 4> kModelNames{
+    "auto", "homogeneous", "layered", "heterogeneous"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -111,7 +113,10 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.one_of({"method", "of minimisation; as_published (Wang 2008) is for comparison only"},
                 r.method,
                 kMethodNames);
-  fields.whole({"max_iterations", "per channel; 0: the homogeneous fit"},
+  fields.one_of({"model", "of the sample; auto: as much as the held-out lights ask for"},
+                r.model,
+                kModelNames);
+  fields.whole({"max_iterations", "per channel and model; 0: the homogeneous fit"},
                r.max_iterations,
                Range::between(0, 100000));
   fields.number({"tolerance", "of every diffusion solve, relative residual"},

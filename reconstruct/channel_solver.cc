@@ -63,9 +63,8 @@ Result<Evaluation> ChannelSolver::evaluate(std::span<const double> x, std::stop_
 Result<ChannelSolver::WarmStart> ChannelSolver::homogeneous_start(std::stop_token stop) {
   const auto fit = fit_homogeneous(problem_, options_, solver_, std::move(stop));
   if (!fit) return fit.error().in("homogeneous fit");
-  solves_before_ = fit->solves;
   const std::size_t cells = problem_.block.cell_count();
-  WarmStart warm{*fit, std::vector<double>(cells, std::log(fit->reduced_scattering))};
+  WarmStart warm{*fit, std::vector<double>(cells, std::log(fit->reduced_scattering)), fit->solves};
   warm.cell_values.resize(2 * cells, std::log(fit->absorption));
   return warm;
 }
@@ -73,6 +72,7 @@ Result<ChannelSolver::WarmStart> ChannelSolver::homogeneous_start(std::stop_toke
 Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
   auto warm = warm_ ? Result<WarmStart>(*warm_) : homogeneous_start(stop);
   if (!warm) return warm.error();
+  solves_before_ = warm->solves;
   ChannelProgress progress;
   progress.report.data_count = problem_.data_count;
   const double noise = problem_.noise / static_cast<double>(problem_.data_count);

@@ -31,6 +31,7 @@ class ChannelSolver {
   struct WarmStart {
     HomogeneousFit homogeneous;
     std::vector<double> cell_values;  ///< (log sigma_s', log sigma_a), as Objective takes them
+    long solves = 0;                  ///< that it took
   };
   ChannelSolver(const ChannelProblem& problem,
                 const InverseOptions& options,

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFormat = 2;
+constexpr int kFormat = 3;
 constexpr std::size_t kLargestFile = std::size_t{4} << 30;
 static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
 
@@ -29,44 +29,107 @@ std::vector<double> unpack(const json& j) {
   return values;
 }
 
+json to_json(const std::optional<Interval>& i) { return i ? json{i->lowest, i->highest} : json(); }
+
+std::optional<Interval> interval_from(const json& j) {
+  if (j.is_null()) return std::nullopt;
+  return Interval{j.at(0).get<double>(), j.at(1).get<double>()};
+}
+
+json to_json(const HomogeneousFit& h) {
+  return {h.reduced_scattering,
+          h.absorption,
+          h.chi_squared,
+          h.iterations,
+          to_json(h.reduced_scattering_interval),
+          to_json(h.absorption_interval)};
+}
+
+HomogeneousFit homogeneous_from(const json& j) {
+  return {.reduced_scattering = j.at(0).get<double>(),
+          .absorption = j.at(1).get<double>(),
+          .chi_squared = j.at(2).get<double>(),
+          .iterations = j.at(3).get<int>(),
+          .solves = 0,
+          .reduced_scattering_interval = interval_from(j.at(4)),
+          .absorption_interval = interval_from(j.at(5))};
+}
+
+json to_json(const RungReport& r) {
+  return {r.name,
+          r.parameters,
+          r.fitted,
+          r.held_out,
+          r.standard_error,
+          r.gain,
+          r.gain_error,
+          r.solves,
+          r.seconds,
+          r.taken,
+          r.why};
+}
+
+RungReport rung_from(const json& j) {
+  return {.name = j.at(0).get<std::string>(),
+          .parameters = j.at(1).get<std::size_t>(),
+          .fitted = j.at(2).get<double>(),
+          .held_out = j.at(3).get<double>(),
+          .standard_error = j.at(4).get<double>(),
+          .gain = j.at(5).get<double>(),
+          .gain_error = j.at(6).get<double>(),
+          .solves = j.at(7).get<long>(),
+          .seconds = j.at(8).get<double>(),
+          .taken = j.at(9).get<bool>(),
+          .why = j.at(10).get<std::string>()};
+}
+
+json to_json(const IterationRecord& i) {
+  return {i.iteration, i.objective, i.chi_squared_per_datum, i.regularization, i.solves};
+}
+
+IterationRecord iteration_from(const json& j) {
+  return {j.at(0).get<int>(),
+          j.at(1).get<double>(),
+          j.at(2).get<double>(),
+          j.at(3).get<double>(),
+          j.at(4).get<long>()};
+}
+
 json to_json(const ChannelReport& r) {
   json history = json::array();
-  for (const IterationRecord& i : r.history) {
-    history.push_back(
-        {i.iteration, i.objective, i.chi_squared_per_datum, i.regularization, i.solves});
-  }
-  return {{"homogeneous",
-           {r.homogeneous.reduced_scattering,
-            r.homogeneous.absorption,
-            r.homogeneous.chi_squared,
-            r.homogeneous.iterations}},
+  for (const IterationRecord& i : r.history) history.push_back(to_json(i));
+  json ladder = json::array();
+  for (const RungReport& rung : r.ladder) ladder.push_back(to_json(rung));
+  return {{"homogeneous", to_json(r.homogeneous)},
           {"history", std::move(history)},
           {"stop_reason", static_cast<int>(r.stop_reason)},
           {"data_count", r.data_count},
           {"noise_per_datum", r.noise_per_datum},
           {"target_per_datum", r.target_per_datum},
           {"solves", r.solves},
-          {"seconds", r.seconds}};
+          {"seconds", r.seconds},
+          {"ladder", std::move(ladder)},
+          {"held_out_noise", r.held_out_noise},
+          {"cross_validated", r.cross_validated},
+          {"model", r.model},
+          {"model_reason", r.model_reason}};
 }
 
 ChannelReport report_from(const json& j) {
   ChannelReport r;
-  const json& h = j.at("homogeneous");
-  r.homogeneous = {
-      h.at(0).get<double>(), h.at(1).get<double>(), h.at(2).get<double>(), h.at(3).get<int>()};
-  for (const json& i : j.at("history")) {
-    r.history.push_back({i.at(0).get<int>(),
-                         i.at(1).get<double>(),
-                         i.at(2).get<double>(),
-                         i.at(3).get<double>(),
-                         i.at(4).get<long>()});
-  }
+  r.homogeneous = homogeneous_from(j.at("homogeneous"));
+  for (const json& i : j.at("history")) r.history.push_back(iteration_from(i));
   r.stop_reason = static_cast<StopReason>(j.at("stop_reason").get<int>());
   r.data_count = j.at("data_count").get<std::size_t>();
   r.noise_per_datum = j.at("noise_per_datum").get<double>();
   r.target_per_datum = j.at("target_per_datum").get<double>();
   r.solves = j.at("solves").get<long>();
   r.seconds = j.at("seconds").get<double>();
+  for (const json& rung : j.at("ladder")) r.ladder.push_back(rung_from(rung));
+  r.held_out_noise = j.at("held_out_noise").get<double>();
+  r.cross_validated = j.at("cross_validated").get<bool>();
+  r.model = j.at("model").get<std::string>();
+  r.model_reason = j.at("model_reason").get<std::string>();
   return r;
 }
 
@@ -92,6 +155,30 @@ LbfgsState state_from(const json& j) {
   return s;
 }
 
+json to_json(const ChannelProgress& p) {
+  return {{"state", to_json(p.state)}, {"report", to_json(p.report)}};
+}
+
+ChannelProgress progress_from(const json& j) {
+  return {state_from(j.at("state")), report_from(j.at("report"))};
+}
+
+json to_json(const LadderProgress& p) {
+  return {{"report", to_json(p.report)},
+          {"best", pack(p.best)},
+          {"finishing", p.finishing},
+          {"current", p.current ? to_json(*p.current) : json()}};
+}
+
+LadderProgress ladder_from(const json& j) {
+  LadderProgress p{report_from(j.at("report")),
+                   unpack(j.at("best")),
+                   j.at("finishing").get<bool>(),
+                   std::nullopt};
+  if (!j.at("current").is_null()) p.current = progress_from(j.at("current"));
+  return p;
+}
+
 json to_json(const Checkpoint& checkpoint) {
   json finished = json::array();
   for (const auto& channel : checkpoint.finished) {
@@ -101,10 +188,7 @@ json to_json(const Checkpoint& checkpoint) {
                         {"report", to_json(channel->report)}});
   }
   json j{{"finished", std::move(finished)}};
-  if (checkpoint.current) {
-    j["current"] = {{"state", to_json(checkpoint.current->state)},
-                    {"report", to_json(checkpoint.current->report)}};
-  }
+  if (checkpoint.current) j["current"] = to_json(*checkpoint.current);
   return j;
 }
 
@@ -116,10 +200,7 @@ Checkpoint checkpoint_from(const json& j) {
         {unpack(f.at("absorption")), unpack(f.at("reduced_scattering"))},
         report_from(f.at("report"))};
   }
-  if (j.contains("current")) {
-    const json& c = j.at("current");
-    checkpoint.current = {state_from(c.at("state")), report_from(c.at("report"))};
-  }
+  if (j.contains("current")) checkpoint.current = ladder_from(j.at("current"));
   return checkpoint;
 }
 
@@ -152,6 +233,7 @@ void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
                            static_cast<double>(o.deposit),
                            static_cast<double>(o.boundary),
                            static_cast<double>(o.method),
+                           static_cast<double>(o.model),
                            static_cast<double>(kFormat)};
   append(bytes, numbers.data(), sizeof numbers);
 }

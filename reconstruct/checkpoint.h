@@ -19,6 +19,14 @@ struct ChannelProgress {
   ChannelReport report;
 };
 
+/// A channel on its way up the ladder of models (reconstruct/model_ladder.h).
+struct LadderProgress {
+  ChannelReport report;      ///< of the rungs so far; its history is that of those taken
+  std::vector<double> best;  ///< cell values of the last one taken; empty: none yet
+  bool finishing = false;  ///< the choice is made, the chosen model is fitted to all illuminations
+  std::optional<ChannelProgress> current;  ///< of the rung under way
+};
+
 /// All that a reconstruction needs to go on as if it had not stopped.
 struct Checkpoint {
   struct Finished {
@@ -26,7 +34,7 @@ struct Checkpoint {
     ChannelReport report;
   };
   std::array<std::optional<Finished>, kColorChannels> finished;
-  std::optional<ChannelProgress> current;  ///< of the first channel that is not finished
+  std::optional<LadderProgress> current;  ///< of the first channel that is not finished
 };
 
 /// SHA-256 over the dataset and every option that the result depends on.

@@ -2,9 +2,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "reconstruct/illumination_subset.h"
 
 namespace opaline::reconstruct {
 namespace {
@@ -15,24 +18,46 @@ constexpr int kMaxIterations = 20;
 constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
-constexpr double kConverged = 1e-3;  // change of the logarithms
-constexpr std::size_t kFew = 4;      // illuminations that two numbers are found from
+constexpr double kConverged = 1e-3;       // change of the logarithms
+constexpr std::size_t kFew = 4;           // illuminations that two numbers are found from
+constexpr double kTwoSided95 = 1.959964;  // of the normal distribution
 
-/// The same problem under at most kFew of its illuminations that have data.
-ChannelProblem with_few_illuminations(const ChannelProblem& problem) {
-  std::vector<const ChannelIllumination*> usable;
-  for (const ChannelIllumination& i : problem.illuminations) {
-    if (std::any_of(i.weight.begin(), i.weight.end(), [](double w) { return w > 0.0; })) {
-      usable.push_back(&i);
+// sqrt(w) dL/d(log sigma_s', sigma_a), a row a datum.
+using Slopes = Eigen::MatrixX2d;
+
+// Mean square of the data, as the model's error has it.
+double square_level(const ChannelIllumination& data) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t x = 0; x < data.weight.size(); ++x) {
+    if (!(data.weight[x] > 0.0)) continue;
+    sum += data.radiance[x] * data.radiance[x];
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+// J^T W V W J + sum_k (J^T W e_k) (J^T W e_k)^T of the header; `slopes` is sqrt(W) J.
+Eigen::Matrix2d score_covariance(const ChannelProblem& problem,
+                                 const Slopes& slopes,
+                                 double model_error) {
+  Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d in_proportion = Eigen::Vector2d::Zero();
+  Eigen::Vector2d everywhere = Eigen::Vector2d::Zero();
+  Eigen::Index n = 0;
+  for (const ChannelIllumination& data : problem.illuminations) {
+    const double level = square_level(data);
+    for (std::size_t x = 0; x < data.weight.size(); ++x, ++n) {
+      if (!(data.weight[x] > 0.0)) continue;
+      const double l = data.radiance[x];
+      const Eigen::Vector2d slope = slopes.row(n);
+      const double model = model_error * model_error * (l * l + level);
+      noise += std::max(1.0 - data.weight[x] * model, 0.0) * slope * slope.transpose();
+      in_proportion += std::sqrt(data.weight[x]) * model_error * l * slope;
+      everywhere += std::sqrt(data.weight[x] * level) * model_error * slope;
     }
   }
-  if (usable.size() <= kFew) return problem;
-  ChannelProblem few = problem;
-  few.illuminations.clear();
-  for (std::size_t n = 0; n < kFew; ++n) {
-    few.illuminations.push_back(*usable[n * (usable.size() - 1) / (kFew - 1)]);
-  }
-  return few;
+  return noise + in_proportion * in_proportion.transpose() + everywhere * everywhere.transpose();
 }
 
 class Fit {
@@ -101,11 +126,54 @@ class Fit {
       if (!moved) return moved.error();
       if (*moved < kConverged) break;
     }
-    return HomogeneousFit{
-        std::exp(logs[0]), std::exp(logs[1]), r->squaredNorm(), iteration, objective_.solves()};
+    return HomogeneousFit{.reduced_scattering = std::exp(logs[0]),
+                          .absorption = std::exp(logs[1]),
+                          .chi_squared = r->squaredNorm(),
+                          .iterations = iteration,
+                          .solves = objective_.solves(),
+                          .reduced_scattering_interval = {},
+                          .absorption_interval = {}};
+  }
+
+  Result<void> add_intervals(HomogeneousFit& fit, double model_error) {
+    const auto slopes = slopes_at(fit);
+    if (!slopes) return slopes.error();
+    const Eigen::Matrix2d inverse =
+        (slopes->transpose() * *slopes).completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::Matrix2d covariance =
+        inverse * score_covariance(problem_, *slopes, model_error) * inverse;
+    const double factor = std::exp(kTwoSided95 * std::sqrt(covariance(0, 0)));
+    const double reach = kTwoSided95 * std::sqrt(covariance(1, 1));
+    fit.reduced_scattering_interval = {fit.reduced_scattering / factor,
+                                       fit.reduced_scattering * factor};
+    fit.absorption_interval = {std::max(fit.absorption - reach, 0.0), fit.absorption + reach};
+    fit.solves = objective_.solves();
+    return ok();
   }
 
  private:
+  // By central differences; one-sided in absorption where there is no room below.
+  Result<Slopes> slopes_at(const HomogeneousFit& fit) {
+    const Logs logs(std::log(fit.reduced_scattering), std::log(fit.absorption));
+    Slopes slopes(static_cast<Eigen::Index>(problem_.camera.size() * problem_.illuminations.size()),
+                  2);
+    const double step =
+        std::max(kDifference * fit.absorption, kDifference * kDifference * fit.reduced_scattering);
+    const double below = fit.absorption > 2.0 * step ? fit.absorption - step : fit.absorption;
+    const std::array<std::array<Logs, 2>, 2> ends{
+        {{logs + kDifference * Logs::Unit(0), logs - kDifference * Logs::Unit(0)},
+         {Logs(logs[0], std::log(fit.absorption + step)), Logs(logs[0], std::log(below))}}};
+    const std::array<double, 2> apart{2.0 * kDifference, fit.absorption + step - below};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto above = residuals(ends[i][0]);
+      if (!above) return above.error();
+      const auto under = residuals(ends[i][1]);
+      if (!under) return under.error();
+      slopes.col(static_cast<Eigen::Index>(i)) = (*above - *under) / apart[i];
+    }
+    return slopes;
+  }
+
   Result<Eigen::MatrixX2d> jacobian(const Logs& logs, Eigen::Index size) {
     Eigen::MatrixX2d columns(size, 2);
     for (int i = 0; i < 2; ++i) {
@@ -160,16 +228,26 @@ Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
                                        const InverseOptions& options,
                                        diffusion::FluenceSolver& solver,
                                        std::stop_token stop) {
-  const ChannelProblem few = with_few_illuminations(problem);
+  const ChannelProblem few = with_illuminations(problem, few_illuminations(problem, kFew));
   Fit sketch(few, options, solver, stop);
   const auto start = sketch.start();
   if (!start) return start.error();
   auto fit = sketch.from(*start);
   if (!fit || options.max_iterations > 0) return fit;
-  const Logs logs(std::log(fit->reduced_scattering), std::log(fit->absorption));
-  auto last = Fit(problem, options, solver, std::move(stop)).from(logs);
-  if (last) last->solves += fit->solves;
-  return last;
+  return refine_homogeneous(problem, options, *fit, solver, std::move(stop));
+}
+
+Result<HomogeneousFit> refine_homogeneous(const ChannelProblem& problem,
+                                          const InverseOptions& options,
+                                          const HomogeneousFit& start,
+                                          diffusion::FluenceSolver& solver,
+                                          std::stop_token stop) {
+  Fit all(problem, options, solver, std::move(stop));
+  auto fit = all.from({std::log(start.reduced_scattering), std::log(start.absorption)});
+  if (!fit) return fit;
+  if (auto added = all.add_intervals(*fit, options.model_error); !added) return added.error();
+  fit->solves += start.solves;
+  return fit;
 }
 
 }  // namespace opaline::reconstruct

@@ -1,6 +1,7 @@
 #include "reconstruct/inverse_options.h"
 
 #include <fmt/format.h>
+#include <array>
 
 #include <cmath>
 
@@ -39,6 +40,12 @@ std::string_view to_string(BackEnd back_end) {
 
 std::string_view to_string(Method method) {
   return method == Method::kLbfgs ? "lbfgs" : "as_published";
+}
+
+std::string_view to_string(Model model) {
+  constexpr std::array<std::string_view, 4> names{
+      "auto", "homogeneous", "layered", "heterogeneous"};
+  return names.at(static_cast<std::size_t>(model));
 }
 
 Result<void> validate(const InverseOptions& o) {

@@ -25,6 +25,15 @@ enum class Method : std::uint8_t {
 };
 std::string_view to_string(Method method);  ///< "lbfgs" | "as_published"
 
+/// How much of a sample may vary.
+enum class Model : std::uint8_t {
+  kAuto,  ///< what the held-out pictures ask for, from homogeneous on (reconstruct/model_choice.h)
+  kHomogeneous,    ///< two numbers a channel
+  kLayered,        ///< two numbers a layer and channel
+  kHeterogeneous,  ///< two numbers a cell and channel
+};
+std::string_view to_string(Model model);  ///< "auto" | "homogeneous" | "layered" | "heterogeneous"
+
 /// Bounds of a coefficient, 1/mm; 0 < lowest < highest.
 struct CoefficientBounds {
   double lowest = 0.0;
@@ -45,8 +54,9 @@ struct InverseOptions {
   /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
   double regularization = 300.0;
   Method method = Method::kLbfgs;
-  int max_iterations = 150;  ///< per channel; 0 keeps the homogeneous fit
-  double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
+  Model model = Model::kAuto;  ///< Method::kAsPublished takes kAuto for kHeterogeneous
+  int max_iterations = 150;    ///< per channel and model; 0 keeps the homogeneous fit
+  double tolerance = 1e-5;     ///< of every diffusion solve, relative residual; > 0
   /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy (model_error hypot(L, l))^2), the
   /// measured noise and this share of the model's error, which counts generously; 0 to 1.
   double discrepancy = 0.1;

@@ -24,7 +24,7 @@ std::string_view to_string(
     StopReason reason);  ///< "discrepancy" | "stalled" | "no_descent" | "iteration_limit"
 std::string_view explain(StopReason reason);  ///< one sentence for people
 
-/// One iteration; the first of a history, 0, is the homogeneous fit.
+/// One iteration; the first of a history, 0, is the homogeneous fit; those of the models taken follow on each other.
 struct IterationRecord {
   int iteration = 0;
   double objective = 0.0;
@@ -32,6 +32,22 @@ struct IterationRecord {
   double regularization = 0.0;
   long solves = 0;  ///< for one right-hand side, of the channel so far
   bool operator==(const IterationRecord&) const = default;
+};
+
+/// What became of one model of the ladder (reconstruct/model_ladder.h). Errors are chi^2 per datum, with weights that count
+/// the measured variance and the model's error: 1 is what those two make.
+struct RungReport {
+  std::string name;             ///< "layered"
+  std::size_t parameters = 0;   ///< of the channel
+  double fitted = 0.0;          ///< over the illuminations of the fit
+  double held_out = 0.0;        ///< over those kept from it; 0 where there are none
+  double standard_error = 0.0;  ///< of held_out
+  double gain = 0.0;        ///< fall of held_out against the rung taken before; the first has none
+  double gain_error = 0.0;  ///< standard error of that, pairwise
+  long solves = 0;          ///< for one right-hand side, of this rung
+  double seconds = 0.0;
+  bool taken = false;
+  std::string why;  ///< one sentence
 };
 
 /// How the reconstruction of one channel went.
@@ -44,6 +60,12 @@ struct ChannelReport {
   double target_per_datum = 0.0;  ///< at which the pictures count as explained
   long solves = 0;                ///< for one right-hand side
   double seconds = 0.0;
+  std::vector<RungReport> ladder;  ///< in the order they were tried
+  double held_out_noise = 0.0;     ///< chi^2 per held-out datum that measured noise alone makes
+  bool cross_validated =
+      false;                 ///< held out of the fit's own illuminations, the dataset having none
+  std::string model;         ///< the rung that the channel stands on: "layered"
+  std::string model_reason;  ///< why no finer one, one sentence
 };
 
 /// ||L - L*|| / ||L*|| over the usable cells of some illuminations, and what their noise alone

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "base/log.h"
-#include "reconstruct/channel_solver.h"
 #include "reconstruct/direct_light.h"
+#include "reconstruct/model_ladder.h"
 #include "reconstruct/prediction.h"
 #include "reconstruct/relighting_error.h"
 
@@ -65,58 +65,59 @@ class Reconstruction {
   }
 
   Result<void> solve_channel(std::size_t channel, std::stop_token stop) {
-    const auto problem =
-        make_channel_problem(dataset_, static_cast<int>(channel), options_, Selection::kFit);
-    if (!problem) return problem.error();
-    report_progress(channel, {});
-    const auto parametrization = Parametrization::full(dataset_.block);
-    ChannelSolver solver(*problem,
-                         options_,
-                         parametrization,
-                         context_.solver,
-                         context_.clock,
-                         {[&](const ChannelReport& report) { report_progress(channel, report); },
-                          [&](const ChannelProgress& progress) { return save(progress); }},
-                         context_.engine);
-    auto progress = solver.run(std::exchange(checkpoint_.current, std::nullopt), stop);
+    auto models =
+        ModelLadder::create(dataset_,
+                            static_cast<int>(channel),
+                            options_,
+                            context_.solver,
+                            context_.clock,
+                            {[&](const ChannelReport& report, std::size_t done, std::size_t rungs) {
+                               report_progress(channel, report, done, rungs);
+                             },
+                             [&](const LadderProgress& progress) { return save(progress); }},
+                            context_.engine);
+    if (!models) return models.error();
+    auto progress = models->run(std::exchange(checkpoint_.current, std::nullopt), stop);
     if (!progress) return progress.error();
     const ChannelReport& report = progress->report;
-    log::info("{} channel: {} iterations, chi^2/N {:.2f}, {}, {:.1f} s",
+    log::info("{} channel: {}, {} iterations, chi^2/N {:.2f}, {}, {:.1f} s",
               channel_name(channel),
+              report.model,
               report.history.back().iteration,
               report.history.back().chi_squared_per_datum,
               to_string(report.stop_reason),
               report.seconds);
-    checkpoint_.finished[channel] = {to_coefficients(parametrization.expand(progress->state.x)),
-                                     report};
+    checkpoint_.finished[channel] = {to_coefficients(progress->best), report};
     if (auto saved = save(); !saved) return saved;
     return context_.events.fact(
         "channel.reconstructed",
         {{"channel", channel_name(channel)},
+         {"model", report.model},
          {"iterations", report.history.back().iteration},
          {"chi_squared_per_datum", report.history.back().chi_squared_per_datum},
          {"stop_reason", to_string(report.stop_reason)},
          {"seconds", report.seconds}});
   }
 
-  Result<void> save(const ChannelProgress& progress) {
+  Result<void> save(const LadderProgress& progress) {
     if (context_.checkpoints == nullptr) return ok();
     checkpoint_.current = progress;
     auto saved = context_.checkpoints->save(checkpoint_);
     checkpoint_.current.reset();
     if (!saved || context_.clock.now() - last_said_ < kBetweenFacts) return saved;
     last_said_ = context_.clock.now();
-    return context_.events.fact("checkpoint.saved",
-                                {{"iteration", progress.report.history.back().iteration}});
+    const auto& history =
+        progress.current ? progress.current->report.history : progress.report.history;
+    return context_.events.fact("checkpoint.saved", {{"iteration", history.back().iteration}});
   }
 
   Result<void> save() const {
     return context_.checkpoints == nullptr ? ok() : context_.checkpoints->save(checkpoint_);
   }
 
-  // How far a channel is: chi^2 falls about exponentially to its target, unless the limit of
+  // How far a model's fit is: chi^2 falls about exponentially to its target, unless the limit of
   // iterations comes first.
-  double channel_fraction(const ChannelReport& report) const {
+  double rung_fraction(const ChannelReport& report) const {
     if (report.history.empty()) return 0.0;
     const IterationRecord& now = report.history.back();
     const double target = std::max(report.target_per_datum, 1e-3);
@@ -127,13 +128,24 @@ class Reconstruction {
     return std::clamp(std::max(fallen, spent), 0.05, 0.99);
   }
 
-  void report_progress(std::size_t channel, const ChannelReport& report) {
+  // Of a channel: the rungs before this one, and this one's own. A ladder may end early.
+  static double share(double of_rung, std::size_t done, std::size_t rungs) {
+    return rungs > 0 ? (static_cast<double>(std::min(done, rungs - 1)) + of_rung) /
+                           static_cast<double>(rungs)
+                     : 0.0;
+  }
+
+  void report_progress(std::size_t channel,
+                       const ChannelReport& report,
+                       std::size_t done,
+                       std::size_t rungs) {
     Progress progress;
     progress.step = report.history.empty() ? "homogeneous fit" : "reconstruction";
-    progress.fraction = (static_cast<double>(channel) + channel_fraction(report)) / kColorChannels;
+    progress.fraction =
+        (static_cast<double>(channel) + share(rung_fraction(report), done, rungs)) / kColorChannels;
     if (!first_fraction_) first_fraction_ = progress.fraction;  // done by those before us
-    if (const double done = progress.fraction - *first_fraction_; done > 0.0)
-      progress.seconds_left = seconds() * (1.0 - progress.fraction) / done;
+    if (const double gone = progress.fraction - *first_fraction_; gone > 0.0)
+      progress.seconds_left = seconds() * (1.0 - progress.fraction) / gone;
     progress.detail["channel"] = channel_name(channel);
     if (!report.history.empty()) {
       const IterationRecord& now = report.history.back();

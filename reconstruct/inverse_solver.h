@@ -26,8 +26,8 @@ struct InverseContext {
 /// Recovers sigma_a and sigma_s' per cell and channel from pictures of a lit sample
 /// (docs/physics.md):
 ///
-///   per channel: homogeneous fit -> L-BFGS on Objective over p = (log sigma_s', log sigma_a),
-///   bounded, until chi^2 is what the measured noise makes of it (Morozov 1966, InverseOptions::discrepancy), or no more is
+///   per channel: up the ladder of models (reconstruct/model_ladder.h) as far as the held-out pictures ask for, on each
+///   L-BFGS on Objective over the model's (log sigma_s', log sigma_a), bounded, until chi^2 is what the measured noise makes of it (Morozov 1966, InverseOptions::discrepancy), or no more is
 ///   to be had
 ///
 /// A cancelled or killed call goes on from its last checkpoint. After each checkpoint the solves
@@ -36,7 +36,7 @@ struct InverseContext {
 ///
 /// Events:  progress "homogeneous fit" and "reconstruction" {channel, iteration, objective,
 /// chi_squared_per_datum};
-///          fact "channel.reconstructed" {channel, iterations, chi_squared_per_datum, stop_reason,
+///          fact "channel.reconstructed" {channel, model, iterations, chi_squared_per_datum, stop_reason,
 ///          seconds}; fact "checkpoint.saved" {iteration}, at most every ten seconds.
 /// Threads: one call at a time per solver.
 /// Errors:  kInvalidArgument for options or a dataset that cannot be used; kCancelled; the

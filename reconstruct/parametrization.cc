@@ -31,6 +31,13 @@ FieldBasis FieldBasis::blocks(const Block& block, int cells_a_node) {
   return {block, nodes};
 }
 
+FieldBasis FieldBasis::columns(const Block& block, Face face, int cells_a_node) {
+  const auto axis = static_cast<std::size_t>(axis_of(face));
+  std::array<int, 3> nodes = blocks(block, cells_a_node).nodes();
+  nodes[axis] = block.cells()[axis];
+  return {block, nodes};
+}
+
 std::vector<FieldBasis::Place> FieldBasis::places(int cells, int nodes) {
   std::vector<Place> out;
   for (int i = 0; i < cells; ++i) {

@@ -28,6 +28,8 @@ class FieldBasis {
   static FieldBasis layered(const Block& block, Face face);
   /// A node every `cells_a_node` cells along each axis, at least one; >= 1. 1: full.
   static FieldBasis blocks(const Block& block, int cells_a_node);
+  /// A node every `cells_a_node` cells along `face`, every cell in depth.
+  static FieldBasis columns(const Block& block, Face face, int cells_a_node);
   static FieldBasis full(const Block& block) { return blocks(block, 1); }
 
   std::size_t size() const { return static_cast<std::size_t>(nodes_[0]) * nodes_[1] * nodes_[2]; }

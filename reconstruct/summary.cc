@@ -21,6 +21,7 @@ Json to_json(const InverseOptions& o) {
           {"deposit", to_string(o.deposit)},
           {"boundary", to_string(o.boundary)},
           {"method", to_string(o.method)},
+          {"model", to_string(o.model)},
           {"model_error", o.model_error},
           {"direct_light_paths", o.direct_light_paths},
           {"regularization", o.regularization},
@@ -46,14 +47,44 @@ Json history_json(const ChannelReport& report) {
   return history;
 }
 
-Json to_json(const ChannelReport& r, const char* name) {
+Json to_json(const std::optional<Interval>& i) { return i ? Json{i->lowest, i->highest} : Json(); }
+
+Json homogeneous_json(const ChannelReport& r) {
   const HomogeneousFit& h = r.homogeneous;
+  return {{"reduced_scattering", h.reduced_scattering},
+          {"absorption", h.absorption},
+          {"reduced_scattering_interval_95", to_json(h.reduced_scattering_interval)},
+          {"absorption_interval_95", to_json(h.absorption_interval)},
+          {"chi_squared_per_datum", h.chi_squared / static_cast<double>(r.data_count)},
+          {"iterations", h.iterations}};
+}
+
+Json ladder_json(const ChannelReport& r) {
+  Json ladder = Json::array();
+  for (const RungReport& rung : r.ladder) {
+    ladder.push_back({{"model", rung.name},
+                      {"parameters", rung.parameters},
+                      {"fitted_chi_squared_per_datum", rung.fitted},
+                      {"held_out_chi_squared_per_datum", rung.held_out},
+                      {"held_out_standard_error", rung.standard_error},
+                      {"gain", rung.gain},
+                      {"gain_standard_error", rung.gain_error},
+                      {"solves", rung.solves},
+                      {"seconds", rung.seconds},
+                      {"taken", rung.taken},
+                      {"why", rung.why}});
+  }
+  return ladder;
+}
+
+Json to_json(const ChannelReport& r, const char* name) {
   return {{"channel", name},
-          {"homogeneous",
-           {{"reduced_scattering", h.reduced_scattering},
-            {"absorption", h.absorption},
-            {"chi_squared_per_datum", h.chi_squared / static_cast<double>(r.data_count)},
-            {"iterations", h.iterations}}},
+          {"model", r.model},
+          {"model_reason", r.model_reason},
+          {"ladder", ladder_json(r)},
+          {"held_out_noise_chi_squared_per_datum", r.held_out_noise},
+          {"cross_validated", r.cross_validated},
+          {"homogeneous", homogeneous_json(r)},
           {"stop_reason", to_string(r.stop_reason)},
           {"stop_explanation", explain(r.stop_reason)},
           {"data", r.data_count},

@@ -14,7 +14,11 @@ namespace opaline::reconstruct {
 ///   solver, seconds
 ///   fitted, held_out     {relighting_error, noise_floor}
 ///   options     {source, deposit, boundary, model_error, regularization, ...}: as used
-///   channels    [{channel, homogeneous {reduced_scattering, absorption, chi_squared_per_datum, iterations},
+///   channels    [{channel, model, model_reason, held_out_noise_chi_squared_per_datum, cross_validated,
+///                 ladder [{model, parameters, fitted_chi_squared_per_datum, held_out_chi_squared_per_datum,
+///                         held_out_standard_error, gain, gain_standard_error, solves, seconds, taken, why}],
+///                 homogeneous {reduced_scattering, absorption, ..._interval_95 [from, to] or null,
+///                              chi_squared_per_datum, iterations},
 ///                 stop_reason, stop_explanation, data, solves, seconds, chi_squared_per_datum,
 ///                 history [{iteration, objective, chi_squared_per_datum, regularization, solves}]}]
 ///   illuminations [{name, held_out, relighting_error}]

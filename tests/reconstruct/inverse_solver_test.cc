@@ -83,6 +83,11 @@ TEST(InverseSolver, RecoversAHomogeneousSample) {
   EXPECT_NEAR(result->channels[0].homogeneous.reduced_scattering, 1.0, 0.1);
   EXPECT_NEAR(result->channels[2].homogeneous.reduced_scattering, 1.6, 0.16);
   EXPECT_NEAR(result->channels[2].homogeneous.absorption, 0.03, 0.006);
+  const auto json =
+      nlohmann::json::parse(summary_json(make_synthetic_dataset(synthetic), options, *result));
+  const auto& interval = json["channels"][0]["homogeneous"]["reduced_scattering_interval_95"];
+  EXPECT_LT(interval[0], result->channels[0].homogeneous.reduced_scattering);
+  EXPECT_GT(interval[1], result->channels[0].homogeneous.reduced_scattering);
 }
 
 TEST(InverseSolver, GivesTheSameBitsWhenInterruptedAnywhere) {
@@ -175,12 +180,18 @@ TEST(InverseSolver, SummarisesItselfAsJson) {
   const Dataset dataset = make_synthetic_dataset(tiny());
   InverseOptions options;
   options.max_iterations = 2;
+  options.model = Model::kHeterogeneous;
   const auto result = invert(dataset, options);
   ASSERT_TRUE(result);
   const auto json = nlohmann::json::parse(summary_json(dataset, options, *result));
   EXPECT_EQ(json["channels"].size(), 3U);
   EXPECT_EQ(json["channels"][0]["history"].size(), 3U);
   EXPECT_EQ(json["channels"][0]["stop_reason"], "iteration_limit");
+  ASSERT_EQ(json["channels"][0]["ladder"].size(), 2U);
+  EXPECT_EQ(json["channels"][0]["ladder"][1]["model"], "heterogeneous");
+  EXPECT_EQ(json["channels"][0]["ladder"][1]["why"], "asked for");
+  EXPECT_EQ(json["channels"][0]["model_reason"], "the model was asked for");
+  EXPECT_TRUE(json["channels"][0]["homogeneous"]["absorption_interval_95"].is_null());
   EXPECT_EQ(json["illuminations"][0]["name"], "region_0");
   EXPECT_GT(json["held_out"]["relighting_error"], 0.0);
 }

@@ -97,8 +97,11 @@ Illumination dark(const Block& block, std::string name, bool held_out, Image<flo
 Coefficients synthetic_coefficients(const SyntheticOptions& options, Vec3 p, int channel) {
   const double scattering = 1.0 + 0.3 * channel;
   const double absorption = 0.01 * (1 + channel);
-  if (!options.heterogeneous) return {scattering, absorption};
   const Vec3 size = options.block.size();
+  if (!options.heterogeneous) {
+    const bool changed = options.layered && p.z > 0.5 * size.z;
+    return {scattering * (changed ? 0.5 : 1.0), absorption * (changed ? 3.0 : 1.0)};
+  }
   const double wave =
       std::sin(9.0 * p.x / size.x) * std::cos(7.0 * p.y / size.y + 3.0 * p.z / size.z);
   const bool vein = std::abs(p.x - p.y) < 0.15 * size.x;

@@ -13,6 +13,8 @@ struct SyntheticOptions {
   int regions = 3;                        ///< n x n regions of the lit face z_min, to fit
   double noise = 0.01;  ///< relative standard deviation; also a floor of 1e-3 of the brightest
   bool heterogeneous = true;
+  bool layered =
+      false;  ///< when not heterogeneous: the half at the camera scatters half and absorbs three times as much
   std::uint32_t seed = 1;
 };
 

@@ -19,6 +19,7 @@ Result<InverseResult> invert(const Dataset& dataset,
                              double tolerance = 1e-9) {
   InverseOptions options;
   options.max_iterations = 12;
+  options.model = Model::kHeterogeneous;
   options.tolerance = tolerance;
   options.checkpoint_every = 4;
   NullSink events;

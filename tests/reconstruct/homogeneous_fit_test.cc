@@ -1,0 +1,118 @@
+#include "reconstruct/homogeneous_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "reconstruct/diffusion/reference_solver.h"
+#include "tests/support/synthetic_dataset.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+constexpr int kRepetitions = 120;
+
+struct Truth {
+  double reduced_scattering = 1.2;
+  double absorption = 0.02;
+};
+
+/// Pictures of a homogeneous block by the very model that is fitted: what is left is noise and what is put on top.
+class Experiment {
+ public:
+  Experiment(const Truth& truth, double model_error) : truth_(truth), model_error_(model_error) {
+    options_.model_error = model_error;
+    Dataset dataset = testing_support::make_synthetic_dataset(
+        {.block = {6, 6, 4, 1.0, 1.0, 1.0}, .regions = 2, .noise = 0.01, .heterogeneous = false});
+    problem_ = *make_channel_problem(dataset, 0, options_, Selection::kFit);
+    Objective objective(problem_, *solver_, {1e-8, 0.0});
+    const std::size_t cells = problem_.block.cell_count();
+    exact_ = *objective.predict({std::vector<double>(cells, truth.absorption),
+                                 std::vector<double>(cells, truth.reduced_scattering)},
+                                {});
+  }
+
+  // Noise of 2 % of each datum and of the brightest's tenth; the model's error is the same in all pictures.
+  HomogeneousFit fit_once(std::mt19937& random) {
+    std::normal_distribution<double> normal;
+    const double in_proportion = model_error_ * normal(random);
+    const double everywhere = model_error_ * normal(random);
+    for (std::size_t m = 0; m < exact_.size(); ++m) {
+      ChannelIllumination& data = problem_.illuminations[m];
+      double level = 0.0;
+      for (const double l : exact_[m]) level += l * l / static_cast<double>(exact_[m].size());
+      level = std::sqrt(level);
+      for (std::size_t x = 0; x < exact_[m].size(); ++x) {
+        const double l = exact_[m][x];
+        const double sigma = 0.02 * std::hypot(l, 0.3 * level);
+        data.radiance[x] = l + sigma * normal(random) + in_proportion * l + everywhere * level;
+        data.weight[x] =
+            1.0 / (sigma * sigma + model_error_ * model_error_ * (l * l + level * level));
+      }
+    }
+    HomogeneousFit start;
+    start.reduced_scattering = truth_.reduced_scattering;
+    start.absorption = truth_.absorption;
+    auto fit = refine_homogeneous(problem_, options_, start, *solver_, {});
+    EXPECT_TRUE(fit) << fit.error().message;
+    return fit ? *fit : start;
+  }
+
+  struct Coverage {
+    double reduced_scattering = 0.0;
+    double absorption = 0.0;
+  };
+  Coverage coverage() {
+    std::mt19937 random(7);
+    Coverage share;
+    const auto holds = [](const std::optional<Interval>& i, double value) {
+      return i && i->lowest <= value && value <= i->highest ? 1.0 / kRepetitions : 0.0;
+    };
+    for (int n = 0; n < kRepetitions; ++n) {
+      const HomogeneousFit fit = fit_once(random);
+      share.reduced_scattering += holds(fit.reduced_scattering_interval, truth_.reduced_scattering);
+      share.absorption += holds(fit.absorption_interval, truth_.absorption);
+    }
+    return share;
+  }
+
+ private:
+  Truth truth_;
+  double model_error_;
+  InverseOptions options_;
+  std::unique_ptr<diffusion::FluenceSolver> solver_ = diffusion::make_reference_solver();
+  ChannelProblem problem_;
+  std::vector<std::vector<double>> exact_;
+};
+
+// 120 draws of probability 0.95: 0.90 to 0.99 is two and a half standard deviations below and two above.
+TEST(HomogeneousFit, HoldsTheTruthIn95Of100IntervalsUnderNoise) {
+  const auto share = Experiment({}, 0.0).coverage();
+  EXPECT_GE(share.reduced_scattering, 0.90);
+  EXPECT_LE(share.reduced_scattering, 0.99);
+  EXPECT_GE(share.absorption, 0.90);
+  EXPECT_LE(share.absorption, 0.99);
+}
+
+TEST(HomogeneousFit, HoldsTheTruthIn95Of100IntervalsWhereTheModelErrsInEveryPicture) {
+  const auto share = Experiment({}, 0.03).coverage();
+  EXPECT_GE(share.reduced_scattering, 0.90);
+  EXPECT_LE(share.reduced_scattering, 0.99);
+  EXPECT_GE(share.absorption, 0.90);
+  EXPECT_LE(share.absorption, 0.99);
+}
+
+// Absorption at its bound: the estimate is one-sided, so more than 95 of 100 may hold it, never fewer.
+TEST(HomogeneousFit, BoundsAbsorptionThatCannotBeToldFromNone) {
+  std::mt19937 random(3);
+  Experiment experiment({1.2, 1e-5}, 0.0);
+  const HomogeneousFit fit = experiment.fit_once(random);
+  ASSERT_TRUE(fit.absorption_interval);
+  EXPECT_EQ(fit.absorption_interval->lowest, 0.0);
+  EXPECT_GT(fit.absorption_interval->highest, 1e-5);
+  EXPECT_LT(fit.absorption_interval->highest, 0.01);  // it is known to be small
+}
+
+}  // namespace
+}  // namespace opaline::reconstruct
