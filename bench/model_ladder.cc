@@ -54,7 +54,7 @@ Result<void> climb(const std::string& kind,
   for (std::size_t c = 0; c < kColorChannels; ++c) {
     const reconstruct::ChannelReport& channel = result->channels[c];
     for (std::size_t n = 0; n < channel.ladder.size(); ++n) {
-      const reconstruct::RungReport& rung = channel.ladder[n];
+      const reconstruct::ModelReport& rung = channel.ladder[n];
       const std::string name = fmt::format("{}, {}, {}", kind, kChannelNames[c], rung.name);
       print_figure("ladder.held_out_chi_squared_per_datum", name, rung.held_out, "1");
       print_figure("ladder.held_out_standard_error", name, rung.standard_error, "1");

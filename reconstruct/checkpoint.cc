@@ -55,7 +55,7 @@ HomogeneousFit homogeneous_from(const json& j) {
           .absorption_interval = interval_from(j.at(5))};
 }
 
-json to_json(const RungReport& r) {
+json to_json(const ModelReport& r) {
   return {r.name,
           r.parameters,
           r.fitted,
@@ -69,7 +69,7 @@ json to_json(const RungReport& r) {
           r.why};
 }
 
-RungReport rung_from(const json& j) {
+ModelReport rung_from(const json& j) {
   return {.name = j.at(0).get<std::string>(),
           .parameters = j.at(1).get<std::size_t>(),
           .fitted = j.at(2).get<double>(),
@@ -99,7 +99,7 @@ json to_json(const ChannelReport& r) {
   json history = json::array();
   for (const IterationRecord& i : r.history) history.push_back(to_json(i));
   json ladder = json::array();
-  for (const RungReport& rung : r.ladder) ladder.push_back(to_json(rung));
+  for (const ModelReport& rung : r.ladder) ladder.push_back(to_json(rung));
   return {{"homogeneous", to_json(r.homogeneous)},
           {"history", std::move(history)},
           {"stop_reason", static_cast<int>(r.stop_reason)},

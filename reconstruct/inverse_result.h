@@ -36,7 +36,7 @@ struct IterationRecord {
 
 /// What became of one model of the ladder (reconstruct/model_ladder.h). Errors are chi^2 per datum, with weights that count
 /// the measured variance and the model's error: 1 is what those two make.
-struct RungReport {
+struct ModelReport {
   std::string name;             ///< "layered"
   std::size_t parameters = 0;   ///< of the channel
   double fitted = 0.0;          ///< over the illuminations of the fit
@@ -60,8 +60,8 @@ struct ChannelReport {
   double target_per_datum = 0.0;  ///< at which the pictures count as explained
   long solves = 0;                ///< for one right-hand side
   double seconds = 0.0;
-  std::vector<RungReport> ladder;  ///< in the order they were tried
-  double held_out_noise = 0.0;     ///< chi^2 per held-out datum that measured noise alone makes
+  std::vector<ModelReport> ladder;  ///< in the order they were tried
+  double held_out_noise = 0.0;      ///< chi^2 per held-out datum that measured noise alone makes
   bool cross_validated =
       false;                 ///< held out of the fit's own illuminations, the dataset having none
   std::string model;         ///< the rung that the channel stands on: "layered"

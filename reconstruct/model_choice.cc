@@ -47,8 +47,8 @@ double block_variance(const Misfit& misfit, double mean, Of of) {
 
 }  // namespace
 
-std::vector<Rung> ladder(Model choice, const Block& block, Face lit_face) {
-  std::vector<Rung> rungs{
+std::vector<ModelRung> models_to_try(Model choice, const Block& block, Face lit_face) {
+  std::vector<ModelRung> rungs{
       {Model::kHomogeneous, "homogeneous", both(FieldBasis::homogeneous(block))}};
   const auto add = [&](Model model, std::string name, const FieldBasis& basis) {
     if (basis.size() > rungs.back().parametrization.reduced_scattering().size())

@@ -11,7 +11,7 @@
 namespace opaline::reconstruct {
 
 /// One model of a sample: what may vary in it.
-struct Rung {
+struct ModelRung {
   Model model = Model::kHomogeneous;  ///< never kAuto
   std::string name;  ///< "homogeneous", "layered", "heterogeneous, a node every 4 cells"
   Parametrization parametrization;
@@ -23,7 +23,7 @@ struct Rung {
 ///   kHomogeneous    that alone
 ///   kLayered        homogeneous, layered
 ///   kHeterogeneous  homogeneous, every cell
-std::vector<Rung> ladder(Model choice, const Block& block, Face lit_face);
+std::vector<ModelRung> models_to_try(Model choice, const Block& block, Face lit_face);
 
 /// How a model explains some illuminations, in the units of the objective: chi^2 = sum w (L - L*)^2, w = 1 / (measured
 /// variance + that of the model's error).

@@ -33,7 +33,7 @@ double noise_of(const ChannelProblem& problem) {
   return problem.data_count > 0 ? problem.noise / static_cast<double>(problem.data_count) : 0.0;
 }
 
-bool has_few_parameters(const Rung& rung) { return rung.model != Model::kHeterogeneous; }
+bool has_few_parameters(const ModelRung& rung) { return rung.model != Model::kHeterogeneous; }
 
 // The same story told on: iterations are numbered through, the shared point between two rungs stands once.
 void append(std::vector<IterationRecord>& history, const std::vector<IterationRecord>& next) {
@@ -67,18 +67,24 @@ Result<ModelLadder> ModelLadder::create(const Dataset& dataset,
   if (split.held_out.data_count == 0 && model == Model::kAuto) split = split_for_validation(*all);
   const bool unchecked = split.held_out.data_count == 0 && model == Model::kAuto;
   if (unchecked) model = Model::kHeterogeneous;
-  auto rungs = ladder(model, dataset.block, dataset.lit_face);
+  auto rungs = models_to_try(model, dataset.block, dataset.lit_face);
   InverseOptions own = options;
   own.model = model;
-  ModelLadder made(
-      *std::move(all), std::move(split), std::move(rungs), own, solver, clock, std::move(hooks));
+  ModelLadder made(*std::move(all),
+                   std::move(split),
+                   std::move(rungs),
+                   own,
+                   solver,
+                   clock,
+                   std::move(hooks),
+                   engine);
   if (unchecked) made.asked_ = "too few illuminations to hold one out and compare models by it";
   return made;
 }
 
 ModelLadder::ModelLadder(ChannelProblem all,
                          ValidationSplit split,
-                         std::vector<Rung> rungs,
+                         std::vector<ModelRung> rungs,
                          InverseOptions options,
                          diffusion::FluenceSolver& solver,
                          const Clock& clock,
@@ -153,7 +159,7 @@ std::optional<std::string> ModelLadder::reason_to_stop(std::size_t next) const {
   return std::nullopt;
 }
 
-const Rung& ModelLadder::best_rung() const {
+const ModelRung& ModelLadder::best_rung() const {
   std::size_t best = 0;
   for (std::size_t n = 0; n < progress_.report.ladder.size(); ++n) {
     if (progress_.report.ladder[n].taken) best = n;
@@ -161,7 +167,7 @@ const Rung& ModelLadder::best_rung() const {
   return rungs_[best];
 }
 
-InverseOptions ModelLadder::options_of(const Rung& rung) const {
+InverseOptions ModelLadder::options_of(const ModelRung& rung) const {
   InverseOptions own = options_;
   if (progress_.finishing || &rung == &rungs_.back()) return own;
   own.stalled = std::max(own.stalled, kStalledBelow);
@@ -170,7 +176,7 @@ InverseOptions ModelLadder::options_of(const Rung& rung) const {
 }
 
 Result<ChannelProgress> ModelLadder::minimise(const ChannelProblem& problem,
-                                              const Rung& rung,
+                                              const ModelRung& rung,
                                               std::stop_token stop) {
   const InverseOptions own = options_of(rung);
   ChannelSolver solver(problem,
@@ -186,7 +192,8 @@ Result<ChannelProgress> ModelLadder::minimise(const ChannelProblem& problem,
                           auto saved = hooks_.checkpoint(progress_);
                           progress_.current.reset();
                           return saved;
-                        }});
+                        }},
+                       engine_);
   solver.start_from({progress_.report.homogeneous, progress_.best, progress_.report.solves});
   return solver.run(std::exchange(progress_.current, std::nullopt), std::move(stop));
 }
@@ -239,7 +246,7 @@ Result<void> ModelLadder::judge(std::size_t rung,
                                 const std::vector<double>& cell_values,
                                 const ChannelReport& report,
                                 std::stop_token stop) {
-  RungReport made;
+  ModelReport made;
   made.name = rungs_[rung].name;
   made.parameters = rungs_[rung].parametrization.size();
   made.fitted = report.history.back().chi_squared_per_datum;
@@ -262,7 +269,7 @@ Result<void> ModelLadder::judge(std::size_t rung,
   return ok();
 }
 
-void ModelLadder::decide(RungReport& report, const Misfit& held_out) const {
+void ModelLadder::decide(ModelReport& report, const Misfit& held_out) const {
   report.held_out = held_out.per_datum();
   report.standard_error = held_out.standard_error();
   report.taken = true;
@@ -298,7 +305,7 @@ void ModelLadder::take(const std::vector<double>& cell_values, const ChannelRepo
 
 Result<void> ModelLadder::finish(std::stop_token stop) {
   const auto start = clock_.now();
-  const Rung& rung = best_rung();
+  const ModelRung& rung = best_rung();
   ChannelReport& report = progress_.report;
   if (rung.model == Model::kHomogeneous) {
     auto fit = refine_homogeneous(all_, options_, report.homogeneous, solver_, std::move(stop));

@@ -16,7 +16,7 @@
 
 namespace opaline::reconstruct {
 
-/// Finds the model that one channel of a dataset requires, by climbing ladder() with a warm start a rung:
+/// Finds the model that one channel of a dataset requires, by climbing models_to_try() with a warm start a rung:
 ///
 ///   - a rung is judged by the illuminations held out of the fit: the dataset's own, or else every fourth of the fit's,
 ///     which the chosen model gets back at the end;
@@ -57,7 +57,7 @@ class ModelLadder {
  private:
   ModelLadder(ChannelProblem all,
               ValidationSplit split,
-              std::vector<Rung> rungs,
+              std::vector<ModelRung> rungs,
               InverseOptions options,
               diffusion::FluenceSolver& solver,
               const Clock& clock,
@@ -68,26 +68,26 @@ class ModelLadder {
   Result<void> fit(std::size_t rung, std::stop_token stop);
   Result<void> fit_homogeneous_rung(std::stop_token stop);
   Result<ChannelProgress> minimise(const ChannelProblem& problem,
-                                   const Rung& rung,
+                                   const ModelRung& rung,
                                    std::stop_token stop);
   Result<void> judge(std::size_t rung,
                      const std::vector<double>& cell_values,
                      const ChannelReport& report,
                      std::stop_token stop);
-  void decide(RungReport& report, const Misfit& held_out) const;
+  void decide(ModelReport& report, const Misfit& held_out) const;
   Result<void> finish(std::stop_token stop);
   Result<Misfit> predict(const ChannelProblem& problem,
                          const std::vector<double>& cell_values,
                          std::stop_token stop);
-  InverseOptions options_of(const Rung& rung) const;
+  InverseOptions options_of(const ModelRung& rung) const;
   void take(const std::vector<double>& cell_values, const ChannelReport& report);
-  const Rung& best_rung() const;
+  const ModelRung& best_rung() const;
   bool can_validate() const { return split_.held_out.data_count > 0; }
 
   ChannelProblem all_;  ///< the dataset's illuminations for the fit
   ValidationSplit split_;
   ChannelProblem few_;  ///< of the fit, for models of few parameters
-  std::vector<Rung> rungs_;
+  std::vector<ModelRung> rungs_;
   InverseOptions options_;
   diffusion::FluenceSolver& solver_;
   const Clock& clock_;

@@ -61,7 +61,7 @@ Json homogeneous_json(const ChannelReport& r) {
 
 Json ladder_json(const ChannelReport& r) {
   Json ladder = Json::array();
-  for (const RungReport& rung : r.ladder) {
+  for (const ModelReport& rung : r.ladder) {
     ladder.push_back({{"model", rung.name},
                       {"parameters", rung.parameters},
                       {"fitted_chi_squared_per_datum", rung.fitted},

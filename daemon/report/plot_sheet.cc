@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "daemon/report/model_section.h"
 #include "daemon/report/report_plots.h"
 
 namespace opaline::daemon {
@@ -44,6 +45,8 @@ std::vector<Order> orders_for(const ReportData& data) {
   }
   orders.push_back(order(
       "convergence", "Misfit over measured variance and model error", convergence_plot(data)));
+  if (const auto plot = ladder_plot(data.reconstruction))
+    orders.push_back(order("model", "Held-out misfit of the models tried", *plot));
   for (const Coefficient coefficient : kCoefficients) {
     for (int c = 0; c < kColorChannels; ++c) {
       orders.push_back(order(std::string(place_of(coefficient)),

@@ -9,6 +9,7 @@
 #include "base/io/image_io.h"
 #include "daemon/report/accuracy.h"
 #include "daemon/report/html.h"
+#include "daemon/report/model_section.h"
 #include "daemon/report/picture.h"
 #include "daemon/report/report_plots.h"
 
@@ -115,6 +116,7 @@ void add_header(const ReportData& data, Page& page) {
   for (const auto& [id, title] : {std::pair{"relighting", "Relighting"},
                                   {"capture", "Capture"},
                                   {"fit", "Fit"},
+                                  {"model", "Model"},
                                   {"convergence", "Convergence"},
                                   {"accuracy", "Accuracy"},
                                   {"material", "Material"},
@@ -207,6 +209,15 @@ void add_fit(const ReportData& data, Page& page) {
   page.end();
 }
 
+void add_model(const ReportData& data, Page& page) {
+  const std::string told = model_section(data.reconstruction);
+  page.begin("model", "How much model the sample needed");
+  page.add(told.empty() ? html::warning("The reconstruction does not tell which models it tried.")
+                        : told);
+  page.add_plots(data, "model");
+  page.end();
+}
+
 void add_convergence(const ReportData& data, Page& page) {
   page.begin("convergence", "Convergence");
   page.add_plots(data, "convergence");
@@ -277,6 +288,7 @@ Result<std::string> report_page(const ReportData& data) {
   add_relighting(data, page);
   add_capture(data, page);
   add_fit(data, page);
+  add_model(data, page);
   add_convergence(data, page);
   page.add(accuracy_section(data));
   add_material(data, page);

@@ -84,6 +84,7 @@ Result<std::unique_ptr<Minimiser>> FakeEngine::begin(const ChannelProblem& probl
 Result<InverseResult> invert(const Dataset& dataset, InversionEngine* engine) {
   InverseOptions options;
   options.max_iterations = 8;
+  options.model = Model::kHeterogeneous;
   options.checkpoint_every = 3;
   options.tolerance = 1e-8;
   options.discrepancy = 0.0;

@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 
 std::vector<std::string> names(Model choice, const Block& block) {
   std::vector<std::string> out;
-  for (const Rung& rung : ladder(choice, block, Face::kZMin)) out.push_back(rung.name);
+  for (const ModelRung& rung : models_to_try(choice, block, Face::kZMin)) out.push_back(rung.name);
   return out;
 }
 

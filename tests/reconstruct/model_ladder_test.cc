@@ -88,7 +88,7 @@ TEST(ModelLadder, TakesAVeinedSampleToItsCells) {
   const auto climbed = climb(make_synthetic_dataset(sample(true, false)));
   ASSERT_TRUE(climbed) << climbed.error().message;
   EXPECT_THAT(climbed->report.model, StartsWith("heterogeneous"));
-  const RungReport& last = climbed->report.ladder.back();
+  const ModelReport& last = climbed->report.ladder.back();
   EXPECT_LT(last.held_out, 0.2 * climbed->report.ladder.front().held_out);
   EXPECT_GT(last.gain, last.gain_error);
   EXPECT_THAT(last.why, HasSubstr("falls"));

@@ -162,8 +162,32 @@ class Fabricator {
       for (int i = 0; i <= 40; ++i) {
         history.push_back({{"iteration", i}, {"chi_squared_per_datum", 1.0 + 80.0 / (1 + i * i)}});
       }
+      nlohmann::json ladder = nlohmann::json::array();
+      for (const char* model : {"homogeneous", "layered", "heterogeneous"}) {
+        const auto tried = static_cast<double>(ladder.size());
+        const bool taken = std::string_view(model) != "layered";
+        ladder.push_back({{"model", model},
+                          {"parameters", 2 + 10 * ladder.size()},
+                          {"fitted_chi_squared_per_datum", 40.0 / (1.0 + tried)},
+                          {"held_out_chi_squared_per_datum", 50.0 / (1.0 + tried)},
+                          {"held_out_standard_error", 1.5},
+                          {"gain", 25.0},
+                          {"gain_standard_error", 2.5},
+                          {"seconds", 1.25},
+                          {"taken", taken},
+                          {"why", taken ? "the held-out error falls" : "no more than chance"}});
+      }
       channels.push_back(
           {{"channel", name},
+           {"model", "heterogeneous"},
+           {"model_reason", "there is no finer model"},
+           {"ladder", ladder},
+           {"held_out_noise_chi_squared_per_datum", 0.5},
+           {"homogeneous",
+            {{"reduced_scattering", 1.25},
+             {"absorption", 0.02},
+             {"reduced_scattering_interval_95", {1.125, 1.375}},
+             {"absorption_interval_95", {0.015, 0.025}}}},
            {"history", history},
            {"chi_squared_per_datum", 1.05},
            {"data", 1000},

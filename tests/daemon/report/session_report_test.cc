@@ -230,6 +230,28 @@ TEST_F(SessionReportTest, ShowsHowThePicturesAreExplained) {
   }
 }
 
+TEST_F(SessionReportTest, ShowsWhichModelsWereTriedAndWhyItStopped) {
+  const auto results = report();
+  const std::string shown = section("model");
+  EXPECT_EQ(count(shown, "<svg"), 1U);
+  for (const auto& channel : results["reconstruction"]["channels"]) {
+    const auto name = channel["channel"].get<std::string>();
+    EXPECT_THAT(shown, HasSubstr(name + ": heterogeneous. Why no finer model: there is no finer"));
+    for (const auto& rung : channel["ladder"]) {
+      EXPECT_THAT(shown,
+                  HasSubstr(fmt::format("<td>{}: {}</td><td>{}</td><td>{:.3g}</td><td>{:.3g} ± 1.5",
+                                        name,
+                                        rung["model"].get<std::string>(),
+                                        rung["parameters"].get<int>(),
+                                        rung["fitted_chi_squared_per_datum"].get<double>(),
+                                        rung["held_out_chi_squared_per_datum"].get<double>())));
+      EXPECT_THAT(shown, HasSubstr(rung["why"].get<std::string>()));
+    }
+  }
+  EXPECT_THAT(shown, HasSubstr("1.25 (1.125 to 1.375)"));
+  EXPECT_THAT(shown, HasSubstr("0.02 (0.015 to 0.025)"));
+}
+
 TEST_F(SessionReportTest, CutsEachCoefficientOfEachChannel) {
   report();
   const std::string shown = section("material");
