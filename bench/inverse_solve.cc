@@ -55,16 +55,39 @@ fs::path cache_directory() {
   return fs::temp_directory_path() / "opaline-bench";
 }
 
+/// A sample that the data come from finite elements of.
+struct Sample {
+  const char* name;
+  sim::SceneOptions scene;
+  Refinement refinement;  ///< of the cells
+};
+
+std::vector<Sample> samples() {
+  const auto of = [](sim::SceneKind kind, const Block& block) {
+    sim::SceneOptions scene;
+    scene.kind = kind;
+    scene.block = block;
+    return scene;
+  };
+  using enum sim::SceneKind;
+  return {{"24x24x6", of(kMarble, {24, 24, 6, 1.0, 1.0, 1.0}), {2, 2, 2}},
+          {"48x48x12", {}, {2, 2, 2}},
+          {"96x96x24", of(kMarble, {96, 96, 24, 0.25, 0.25, 0.25}), {2, 2, 2}},
+          {"wax1", of(kWax, {130, 53, 37, 0.5, 0.5, 0.5}), {2, 2, 2}},
+          {"marble", of(kMarble, {256, 256, 20, 0.5, 0.5, 0.5}), {1, 1, 2}}};
+}
+
 /// From the cache, or computed and put there.
-Result<TransportResponses> elements_of(const std::string& name, const sim::SceneOptions& scene) {
-  const fs::path file = cache_directory() / fmt::format("elements-{}.transport", name);
-  if (auto stored = read_transport(file); stored && stored->scene == sim::to_json(scene))
+Result<TransportResponses> elements_of(const Sample& sample) {
+  const fs::path file = cache_directory() / fmt::format("elements-{}.transport", sample.name);
+  if (auto stored = read_transport(file); stored && stored->scene == sim::to_json(sample.scene))
     return stored;
-  const auto material = sim::make_material(scene);
+  const auto material = sim::make_material(sample.scene);
   if (!material) return material.error();
-  fmt::print(stderr, "{}: finite elements, some minutes the first time\n", name);
-  TransportResponses responses = finite_element_responses(*material, kPatches);
-  responses.scene = sim::to_json(scene);
+  fmt::print(stderr, "{}: finite elements, some minutes the first time\n", sample.name);
+  TransportResponses responses =
+      finite_element_responses(*material, kPatches, sample.refinement);
+  responses.scene = sim::to_json(sample.scene);
   std::error_code ignored;
   fs::create_directories(file.parent_path(), ignored);
   if (auto kept = write_transport(system_files(), file, responses); !kept)
@@ -73,10 +96,13 @@ Result<TransportResponses> elements_of(const std::string& name, const sim::Scene
 }
 
 Result<Case> make_case(const std::string& name) {
-  if (name == "48x48x12" || name == "48x48x12-n8") {
-    auto responses = elements_of("48x48x12", {});
+  const bool finer = name.ends_with("-n8");
+  const std::string sample_name = finer ? name.substr(0, name.size() - 3) : name;
+  for (const Sample& sample : samples()) {
+    if (sample_name != sample.name) continue;
+    auto responses = elements_of(sample);
     if (!responses) return responses.error();
-    return Case{name, *std::move(responses), name == "48x48x12" ? 4 : 8};
+    return Case{name, *std::move(responses), finer ? 8 : 4};
   }
   if (const auto material = material_case(name)) {
     auto responses = responses_of(*material, cache_directory());
@@ -85,7 +111,8 @@ Result<Case> make_case(const std::string& name) {
   }
   if (!name.ends_with(".transport")) {
     return invalid_argument(
-        fmt::format("no case '{}'; there are 48x48x12, 48x48x12-n8, {} and *.transport files",
+        fmt::format("no case '{}'; there are 24x24x6, 48x48x12, 96x96x24, wax1 and marble, each also with -n8 after it, "
+                    "{} and *.transport files",
                     name,
                     fmt::join(material_case_names(), ", ")));
   }

@@ -1,11 +1,13 @@
 #include "bench/inverse/finite_elements.h"
 
-#include <Eigen/IterativeLinearSolvers>
-#include <Eigen/Sparse>
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "bench/inverse/element_mesh.h"
+#include "bench/inverse/element_solver.h"
 #include "reconstruct/diffusion/boundary.h"
 #include "reconstruct/diffusion/camera_equation.h"
 
@@ -13,139 +15,89 @@ namespace opaline::bench {
 namespace {
 
 namespace diffusion = reconstruct::diffusion;
-using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
-using Corners = std::array<Eigen::Index, 8>;
 
-/// Two elements a cell along each axis.
-struct Mesh {
-  Block cells;
-  int nx = 0, ny = 0, nz = 0;           // elements
-  double hx = 0.0, hy = 0.0, hz = 0.0;  // of an element, mm
-  Eigen::Index node(int i, int j, int k) const {
-    return (static_cast<Eigen::Index>(k) * (ny + 1) + j) * (nx + 1) + i;
-  }
-  Eigen::Index node_count() const { return node(nx, ny, nz) + 1; }
-  std::size_t cell_of(int i, int j, int k) const { return cells.index(i / 2, j / 2, k / 2); }
-  /// The corners of an element, x fastest.
-  Corners corners(int i, int j, int k) const {
-    Corners c{};
-    for (int n = 0; n < 8; ++n)
-      c[static_cast<std::size_t>(n)] = node(i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
-    return c;
-  }
-};
+constexpr double kTolerance = 1e-9;
+constexpr std::size_t kWidth = kElementFields;
 
-Mesh make_mesh(const Block& b) {
-  return {b, 2 * b.nx, 2 * b.ny, 2 * b.nz, b.hx / 2, b.hy / 2, b.hz / 2};
-}
+/// int Q v of the perpendicular ray bundle of irradiance q, transmitted, through the elements above cell (x, y), into
+/// right-hand side `lane`.
+class Rays {
+ public:
+  Rays(const Block& block, const Refinement& refinement, const ChannelCoefficients& coefficients)
+      : block_(block), r_(refinement), c_(coefficients) {}
 
-using Local = std::array<std::array<double, 8>, 8>;
-
-/// int grad v_a . grad v_b and int v_a v_b over one element: products of the one-dimensional integrals of linear functions.
-void element_integrals(const Mesh& mesh, Local& stiffness, Local& mass) {
-  const std::array<double, 3> h{mesh.hx, mesh.hy, mesh.hz};
-  for (int a = 0; a < 8; ++a)
-    for (int b = 0; b < 8; ++b) {
-      std::array<double, 3> m{};
-      std::array<double, 3> s{};
-      for (int axis = 0; axis < 3; ++axis) {
-        const bool same = (a >> axis & 1) == (b >> axis & 1);
-        m[static_cast<std::size_t>(axis)] =
-            h[static_cast<std::size_t>(axis)] * (same ? 2 : 1) / 6.0;
-        s[static_cast<std::size_t>(axis)] = (same ? 1.0 : -1.0) / h[static_cast<std::size_t>(axis)];
-      }
-      stiffness[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] =
-          s[0] * m[1] * m[2] + m[0] * s[1] * m[2] + m[0] * m[1] * s[2];
-      mass[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] = m[0] * m[1] * m[2];
+  void add(int x, int y, double q, std::size_t lane, std::vector<double>& load) const {
+    const double hz = block_.hz / r_[2];
+    double arriving = q * (block_.hx / r_[0]) * (block_.hy / r_[1]);  // W a column of elements
+    for (int k = 0; k < block_.nz * r_[2]; ++k) {
+      const std::size_t cell = block_.index(x, y, k / r_[2]);
+      const double extinction = c_.absorption[cell] + c_.reduced_scattering[cell];
+      const double t = extinction * hz;
+      const double scattered =
+          arriving * -std::expm1(-t) * c_.reduced_scattering[cell] / extinction;
+      const double far =
+          t < 1e-4 ? 0.5 - t / 12.0 : 1.0 / t - 1.0 / std::expm1(t);  // centroid / hz
+      spread(x, y, k, scattered / 4.0 * (1.0 - far), lane, load);
+      spread(x, y, k + 1, scattered / 4.0 * far, lane, load);
+      arriving *= std::exp(-t);
     }
-}
-
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
-/// int v_a v_b / (2 A) over the surface rectangles of one pair of opposite faces, perpendicular to `axis`.
-void add_surface(const Mesh& mesh, int axis, double a, Triplets& entries) {
-  const std::array<int, 3> count{mesh.nx, mesh.ny, mesh.nz};
-  const std::array<double, 3> h{mesh.hx, mesh.hy, mesh.hz};
-  const auto u = static_cast<std::size_t>((axis + 1) % 3);
-  const auto v = static_cast<std::size_t>((axis + 2) % 3);
-  for (const int side : {0, count[static_cast<std::size_t>(axis)]})
-    for (int p = 0; p < count[u]; ++p)
-      for (int q = 0; q < count[v]; ++q)
-        for (int m = 0; m < 4; ++m)
-          for (int n = 0; n < 4; ++n) {
-            const auto at = [&](int corner) {
-              std::array<int, 3> ijk{};
-              ijk[static_cast<std::size_t>(axis)] = side;
-              ijk[u] = p + (corner & 1);
-              ijk[v] = q + (corner >> 1);
-              return mesh.node(ijk[0], ijk[1], ijk[2]);
-            };
-            const double along_u = h[u] * ((m & 1) == (n & 1) ? 2 : 1) / 6.0;
-            const double along_v = h[v] * ((m >> 1) == (n >> 1) ? 2 : 1) / 6.0;
-            entries.emplace_back(at(m), at(n), along_u * along_v / (2.0 * a));
-          }
-}
-
-Matrix assemble(const Mesh& mesh, const ChannelCoefficients& c, double a) {
-  Local stiffness{};
-  Local mass{};
-  element_integrals(mesh, stiffness, mass);
-  Triplets entries;
-  entries.reserve(static_cast<std::size_t>(mesh.nx) * mesh.ny * mesh.nz * 64);
-  for (int k = 0; k < mesh.nz; ++k)
-    for (int j = 0; j < mesh.ny; ++j)
-      for (int i = 0; i < mesh.nx; ++i) {
-        const std::size_t cell = mesh.cell_of(i, j, k);
-        const double kappa = 1.0 / (3.0 * (c.absorption[cell] + c.reduced_scattering[cell]));
-        const Corners nodes = mesh.corners(i, j, k);
-        for (std::size_t m = 0; m < 8; ++m)
-          for (std::size_t n = 0; n < 8; ++n)
-            entries.emplace_back(
-                nodes[m], nodes[n], kappa * stiffness[m][n] + c.absorption[cell] * mass[m][n]);
-      }
-  for (int axis = 0; axis < 3; ++axis) add_surface(mesh, axis, a, entries);
-  Matrix matrix(mesh.node_count(), mesh.node_count());
-  matrix.setFromTriplets(entries.begin(), entries.end());
-  return matrix;
-}
-
-/// int Q v of a perpendicular ray bundle of irradiance q, transmitted, through the elements above (i, j).
-void add_ray(
-    const Mesh& mesh, const ChannelCoefficients& c, int i, int j, double q, Eigen::VectorXd& load) {
-  double arriving = q * mesh.hx * mesh.hy;  // W
-  for (int k = 0; k < mesh.nz; ++k) {
-    const std::size_t cell = mesh.cell_of(i, j, k);
-    const double extinction = c.absorption[cell] + c.reduced_scattering[cell];
-    const double t = extinction * mesh.hz;
-    const double scattered = arriving * -std::expm1(-t) * c.reduced_scattering[cell] / extinction;
-    const double far = t < 1e-4 ? 0.5 - t / 12.0 : 1.0 / t - 1.0 / std::expm1(t);  // centroid / hz
-    const Corners nodes = mesh.corners(i, j, k);
-    for (std::size_t n = 0; n < 8; ++n)
-      load[nodes[n]] += scattered / 4.0 * (n < 4 ? 1.0 - far : far);
-    arriving *= std::exp(-t);
   }
-}
+
+ private:
+  // A quarter of a column's share to each of its four nodes of layer k, for all columns of the cell.
+  void spread(
+      int x, int y, int k, double power, std::size_t lane, std::vector<double>& load) const {
+    const auto row = static_cast<std::size_t>(block_.nx) * r_[0] + 1;
+    const auto plane = row * (static_cast<std::size_t>(block_.ny) * r_[1] + 1);
+    for (int j = 0; j < r_[1]; ++j)
+      for (int i = 0; i < r_[0]; ++i)
+        for (const int corner : {0, 1, 2, 3}) {
+          const std::size_t node = static_cast<std::size_t>(k) * plane +
+                                   static_cast<std::size_t>(y * r_[1] + j + corner / 2) * row +
+                                   static_cast<std::size_t>(x * r_[0] + i + corner % 2);
+          load[node * kWidth + lane] += power;
+        }
+  }
+
+  const Block& block_;
+  const Refinement& r_;
+  const ChannelCoefficients& c_;
+};
 
 double normal_transmittance(double ior) { return 1.0 - std::pow((ior - 1.0) / (ior + 1.0), 2); }
 
+/// Of the piecewise linear function over one cell: its mean is the weighted sum of the nodes' values.
+std::vector<double> mean_weights(int elements) {
+  std::vector<double> weights(static_cast<std::size_t>(elements) + 1, 1.0 / elements);
+  weights.front() = weights.back() = 0.5 / elements;
+  return weights;
+}
+
 /// The flux through each cell of z_max, then the radiance to the camera.
-void observe(const Mesh& mesh,
-             const Eigen::VectorXd& phi,
+void observe(const Block& block,
+             const Refinement& r,
+             const std::vector<double>& phi,
+             std::size_t lane,
              const diffusion::Boundary& boundary,
-             double ior,
-             Vec3 camera,
+             const TransportResponses& t,
              int channel,
              Image<float>& radiance) {
-  constexpr std::array kWeights{0.25, 0.5, 0.25};  // the mean of two linear pieces
-  for (int y = 0; y < mesh.cells.ny; ++y)
-    for (int x = 0; x < mesh.cells.nx; ++x) {
+  const std::vector<double> wx = mean_weights(r[0]);
+  const std::vector<double> wy = mean_weights(r[1]);
+  const auto row = static_cast<std::size_t>(block.nx) * r[0] + 1;
+  const auto plane = row * (static_cast<std::size_t>(block.ny) * r[1] + 1);
+  const std::size_t top = static_cast<std::size_t>(block.nz) * r[2] * plane;
+  for (int y = 0; y < block.ny; ++y)
+    for (int x = 0; x < block.nx; ++x) {
       double mean = 0.0;
-      for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i)
-          mean += kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)] *
-                  phi[mesh.node(2 * x + i, 2 * y + j, mesh.nz)];
-      const Vec3 to = normalized(camera - mesh.cells.face_cell_centre(Face::kZMax, x, y));
-      const double gain = diffusion::camera_equation(ior, boundary, to.z).flux_gain;
+      for (std::size_t j = 0; j < wy.size(); ++j)
+        for (std::size_t i = 0; i < wx.size(); ++i) {
+          const std::size_t node = top + (static_cast<std::size_t>(y * r[1]) + j) * row +
+                                   static_cast<std::size_t>(x * r[0]) + i;
+          mean += wx[i] * wy[j] * phi[node * kWidth + lane];
+        }
+      const Vec3 to = normalized(t.camera_centre - block.face_cell_centre(Face::kZMax, x, y));
+      const double gain = diffusion::camera_equation(t.ior, boundary, to.z).flux_gain;
       radiance.at(x, y, channel) = static_cast<float>(gain * mean / (2.0 * boundary.a));
     }
 }
@@ -166,42 +118,55 @@ TransportResponses empty_responses(const Material& material, int patches) {
   return t;
 }
 
+/// Eight patches from `first` on, in one channel.
+void add_patches(const std::vector<ElementMesh>& levels,
+                 const ChannelCoefficients& c,
+                 const Refinement& refinement,
+                 const diffusion::Boundary& boundary,
+                 std::size_t first,
+                 int channel,
+                 ElementSolver& solver,
+                 TransportResponses& t) {
+  std::vector<double> load(levels.front().nodes() * kWidth, 0.0);
+  const Rays rays(t.block, refinement, c);
+  for (int y = 0; y < t.block.ny; ++y)
+    for (int x = 0; x < t.block.nx; ++x) {
+      const int patch = (y * t.patches_y / t.block.ny) * t.patches_x + x * t.patches_x / t.block.nx;
+      const auto lane = static_cast<std::size_t>(patch) - first;
+      if (lane < kWidth) rays.add(x, y, normal_transmittance(t.ior), lane, load);
+    }
+  std::vector<double> phi(load.size());
+  solver.solve(load, phi, kTolerance);
+  for (std::size_t lane = 0; lane < kWidth && first + lane < t.patches.size(); ++lane)
+    observe(t.block,
+            refinement,
+            phi,
+            lane,
+            boundary,
+            t,
+            channel,
+            t.patches[first + lane].radiance);
+}
+
 }  // namespace
 
-TransportResponses finite_element_responses(const Material& material, int patches) {
-  const Mesh mesh = make_mesh(material.block);
+TransportResponses finite_element_responses(const Material& material,
+                                            int patches,
+                                            const Refinement& refinement) {
   const auto boundary =
       *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, material.ior);
   TransportResponses t = empty_responses(material, patches);
   for (std::size_t channel = 0; channel < kColorChannels; ++channel) {
     const ChannelCoefficients& c = material.channels[channel];
-    const Matrix matrix = assemble(mesh, c, boundary.a);
+    const auto levels = element_hierarchy(t.block, c, boundary.a, refinement);
+    fmt::print(stderr, "finite elements: channel {} of {}\n", channel + 1, kColorChannels);
 #pragma omp parallel
     {
-      Eigen::ConjugateGradient<
-          Matrix,
-          Eigen::Lower | Eigen::Upper,
-          Eigen::IncompleteCholesky<double, Eigen::Lower, Eigen::NaturalOrdering<int>>>
-          solver;
-      solver.setTolerance(1e-9);
-      solver.compute(matrix);
+      ElementSolver solver(levels);
 #pragma omp for schedule(dynamic)
-      for (int patch = 0; patch < patches * patches; ++patch) {
-        Eigen::VectorXd load = Eigen::VectorXd::Zero(mesh.node_count());
-        for (int j = 0; j < mesh.ny; ++j)
-          for (int i = 0; i < mesh.nx; ++i)
-            if (i * patches / mesh.nx == patch % patches &&
-                j * patches / mesh.ny == patch / patches)
-              add_ray(mesh, c, i, j, normal_transmittance(material.ior), load);
-        const Eigen::VectorXd phi = solver.solve(load);
-        observe(mesh,
-                phi,
-                boundary,
-                material.ior,
-                t.camera_centre,
-                static_cast<int>(channel),
-                t.patches[static_cast<std::size_t>(patch)].radiance);
-      }
+      for (std::size_t first = 0; first < t.patches.size(); first += kWidth)
+        add_patches(
+            levels, c, refinement, boundary, first, static_cast<int>(channel), solver, t);
     }
   }
   return t;
