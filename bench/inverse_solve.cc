@@ -85,8 +85,7 @@ Result<TransportResponses> elements_of(const Sample& sample) {
   const auto material = sim::make_material(sample.scene);
   if (!material) return material.error();
   fmt::print(stderr, "{}: finite elements, some minutes the first time\n", sample.name);
-  TransportResponses responses =
-      finite_element_responses(*material, kPatches, sample.refinement);
+  TransportResponses responses = finite_element_responses(*material, kPatches, sample.refinement);
   responses.scene = sim::to_json(sample.scene);
   std::error_code ignored;
   fs::create_directories(file.parent_path(), ignored);
@@ -306,6 +305,8 @@ int main(int argc, char** argv) try {
   app.add_option("--noise", data.noise, "Relative noise added");
   app.add_option("--seed", data.seed, "Of the noise");
   app.add_option("--regularization", options.regularization);
+  bool edges = false;
+  app.add_flag("--tv", edges, "Total variation as the regulariser, not H1");
   app.add_option("--model-error", options.model_error);
   app.add_option("--discrepancy", options.discrepancy);
   app.add_option("--stalled", options.stalled);
@@ -313,6 +314,7 @@ int main(int argc, char** argv) try {
   app.add_option("--max-iterations", options.max_iterations);
   app.add_option("--threads", options.threads);
   CLI11_PARSE(app, argc, argv);
+  if (edges) options.regularizer = reconstruct::Smoothness::kTotalVariation;
   return bench::run_all(names, data, options, published);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

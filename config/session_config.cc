@@ -25,6 +25,7 @@ constexpr std::array<std::string_view, 2> kMethodNames{"lbfgs", "as_published"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 4> kModelNames{
     "auto", "homogeneous", "layered", "heterogeneous"};
+constexpr std::array<std::string_view, 2> kSmoothnessNames{"h1", "tv"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -110,6 +111,8 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
                 Range::at_least(0));
   fields.number(
       {"regularization", "weight of smoothness; 0: none"}, r.regularization, Range::at_least(0));
+  fields.one_of(
+      {"regularizer", "smooth blobs, or few edges however sharp"}, r.regularizer, kSmoothnessNames);
   fields.one_of({"method", "of minimisation; as_published (Wang 2008) is for comparison only"},
                 r.method,
                 kMethodNames);

@@ -28,7 +28,8 @@ ChannelSolver::ChannelSolver(const ChannelProblem& problem,
       clock_(clock),
       hooks_(std::move(hooks)),
       engine_(engine),
-      objective_(problem, solver, {options.tolerance, options.regularization}) {}
+      objective_(
+          problem, solver, {options.tolerance, options.regularization, options.regularizer}) {}
 
 Bounds ChannelSolver::bounds() const {
   const std::size_t scattering = parametrization_.reduced_scattering().size();

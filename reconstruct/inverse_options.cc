@@ -48,6 +48,10 @@ std::string_view to_string(Model model) {
   return names.at(static_cast<std::size_t>(model));
 }
 
+std::string_view to_string(Smoothness smoothness) {
+  return smoothness == Smoothness::kH1 ? "h1" : "tv";
+}
+
 Result<void> validate(const InverseOptions& o) {
   if (!not_negative(o.direct_light_paths))
     return expected("direct_light_paths", o.direct_light_paths, ">= 0");

@@ -34,6 +34,13 @@ enum class Model : std::uint8_t {
 };
 std::string_view to_string(Model model);  ///< "auto" | "homogeneous" | "layered" | "heterogeneous"
 
+/// What the smoothness prior asks of the logarithms of the coefficients (reconstruct/regularizer.h).
+enum class Smoothness : std::uint8_t {
+  kH1,              ///< small squared gradients: blobs
+  kTotalVariation,  ///< few edges, however sharp: veins, grains and layers
+};
+std::string_view to_string(Smoothness smoothness);  ///< "h1" | "tv"
+
 /// Bounds of a coefficient, 1/mm; 0 < lowest < highest.
 struct CoefficientBounds {
   double lowest = 0.0;
@@ -53,6 +60,7 @@ struct InverseOptions {
   double direct_light_paths = 3.0;
   /// Weight of the smoothness prior, in chi-squared units: see reconstruct/regularizer.h; >= 0.
   double regularization = 300.0;
+  Smoothness regularizer = Smoothness::kH1;
   Method method = Method::kLbfgs;
   Model model = Model::kAuto;  ///< Method::kAsPublished takes kAuto for kHeterogeneous
   int max_iterations = 150;    ///< per channel and model; 0 keeps the homogeneous fit

@@ -48,7 +48,7 @@ Objective::Objective(const ChannelProblem& problem,
     : problem_(problem),
       solver_(solver),
       settings_(settings),
-      regularizer_(problem.block, settings.regularization) {
+      regularizer_(problem.block, settings.regularization, settings.regularizer) {
   start_afresh();
 }
 

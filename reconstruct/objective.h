@@ -31,6 +31,7 @@ class Objective {
   struct Settings {
     double tolerance = 1e-6;      ///< of the diffusion solves
     double regularization = 0.0;  ///< lambda of the Regularizer
+    Smoothness regularizer = Smoothness::kH1;
   };
   Objective(const ChannelProblem& problem, diffusion::FluenceSolver& solver, Settings settings);
 

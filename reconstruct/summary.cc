@@ -25,6 +25,7 @@ Json to_json(const InverseOptions& o) {
           {"model_error", o.model_error},
           {"direct_light_paths", o.direct_light_paths},
           {"regularization", o.regularization},
+          {"regularizer", to_string(o.regularizer)},
           {"max_iterations", o.max_iterations},
           {"tolerance", o.tolerance},
           {"discrepancy", o.discrepancy},

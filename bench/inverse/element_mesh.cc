@@ -146,10 +146,9 @@ std::vector<ElementMatrix> galerkin(const ElementMesh& fine,
       for (std::size_t i = 0; i < fine.axes[0].elements(); ++i) {
         const std::size_t parent = coarse.element(
             fine.axes[0].parents[i], fine.axes[1].parents[j], fine.axes[2].parents[k]);
-        add_galerkin(
-            {ends_of(fine.axes[0], i), ends_of(fine.axes[1], j), ends_of(fine.axes[2], k)},
-            matrix_of(i, j, k),
-            out[parent]);
+        add_galerkin({ends_of(fine.axes[0], i), ends_of(fine.axes[1], j), ends_of(fine.axes[2], k)},
+                     matrix_of(i, j, k),
+                     out[parent]);
       }
   return out;
 }

@@ -19,8 +19,9 @@ using ElementMatrix = std::array<double, 64>;
 /// One axis of a mesh of boxes: the widths of its elements, and where they lie in the next coarser axis, whose elements
 /// hold one or two of these.
 struct ElementAxis {
-  std::vector<double> widths;          ///< mm
-  std::vector<std::uint32_t> parents;  ///< the coarse element of each element; empty on the coarsest
+  std::vector<double> widths;  ///< mm
+  std::vector<std::uint32_t>
+      parents;  ///< the coarse element of each element; empty on the coarsest
   /// Of each node: the share of the right end of its coarse element; the left end is parent_node.
   std::vector<double> shares;
   std::vector<std::uint32_t> parent_nodes;

@@ -84,16 +84,13 @@ OPALINE_CLONES void dots(std::size_t nodes, const double* a, const double* b, do
 }
 
 // y = alpha x + beta y
-OPALINE_CLONES void combine(std::size_t nodes,
-                            const double* alpha,
-                            const double* x,
-                            const double* beta,
-                            double* y) {
+OPALINE_CLONES void combine(
+    std::size_t nodes, const double* alpha, const double* x, const double* beta, double* y) {
   const Lanes by = *reinterpret_cast<const Lanes*>(alpha);
   const Lanes keep = *reinterpret_cast<const Lanes*>(beta);
   for (std::size_t n = 0; n < nodes * kWidth; n += kWidth)
-    *reinterpret_cast<Lanes*>(y + n) = by * *reinterpret_cast<const Lanes*>(x + n) +
-                                       keep * *reinterpret_cast<const Lanes*>(y + n);
+    *reinterpret_cast<Lanes*>(y + n) =
+        by * *reinterpret_cast<const Lanes*>(x + n) + keep * *reinterpret_cast<const Lanes*>(y + n);
 }
 
 /// Values at the nodes, with room before and after them for what the stencil multiplies by zero.
@@ -149,7 +146,7 @@ class ElementSolver::Levels {
       levels_.push_back({&mesh, offsets_of(mesh), Field(mesh), Field(mesh), Field(mesh)});
   }
 
-  Field& right() { return levels_.front().b; }     // of the V-cycle
+  Field& right() { return levels_.front().b; }      // of the V-cycle
   Field& corrected() { return levels_.front().x; }  // its answer
   const ElementMesh& mesh() const { return *levels_.front().mesh; }
   const Offsets& offsets() const { return levels_.front().offsets; }
@@ -226,12 +223,8 @@ int ElementSolver::solve(std::span<const double> b, std::span<double> phi, doubl
     for (std::size_t w = 0; w < kWidth; ++w) beta[w] = energy[w] > 0.0 ? next[w] / energy[w] : 0.0;
     energy = next;
     combine(nodes, ones.data(), l.corrected().data(), beta.data(), l.direction.data());
-    residual(l.mesh().stencil.data(),
-             l.offsets(),
-             nodes,
-             nullptr,
-             l.direction.data(),
-             l.product.data());
+    residual(
+        l.mesh().stencil.data(), l.offsets(), nodes, nullptr, l.direction.data(), l.product.data());
     Scalars curvature{};
     dots(nodes, l.direction.data(), l.product.data(), curvature.data());
     Scalars alpha{};

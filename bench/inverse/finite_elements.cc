@@ -138,14 +138,7 @@ void add_patches(const std::vector<ElementMesh>& levels,
   std::vector<double> phi(load.size());
   solver.solve(load, phi, kTolerance);
   for (std::size_t lane = 0; lane < kWidth && first + lane < t.patches.size(); ++lane)
-    observe(t.block,
-            refinement,
-            phi,
-            lane,
-            boundary,
-            t,
-            channel,
-            t.patches[first + lane].radiance);
+    observe(t.block, refinement, phi, lane, boundary, t, channel, t.patches[first + lane].radiance);
 }
 
 }  // namespace
@@ -165,8 +158,7 @@ TransportResponses finite_element_responses(const Material& material,
       ElementSolver solver(levels);
 #pragma omp for schedule(dynamic)
       for (std::size_t first = 0; first < t.patches.size(); first += kWidth)
-        add_patches(
-            levels, c, refinement, boundary, first, static_cast<int>(channel), solver, t);
+        add_patches(levels, c, refinement, boundary, first, static_cast<int>(channel), solver, t);
     }
   }
   return t;

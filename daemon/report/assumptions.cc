@@ -50,7 +50,11 @@ std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& d
       {"Model error",
        fmt::format("{} % of each datum and of its picture, on top of the measured noise",
                    100.0 * options.model_error)},
-      {"Smoothness", fmt::format("weight {}", options.regularization)},
+      {"Smoothness",
+       fmt::format("{}, weight {}",
+                   options.regularizer == reconstruct::Smoothness::kH1 ? "squared gradients (H1)"
+                                                                       : "total variation",
+                   options.regularization)},
       {"Calibration",
        data.config.rig.is_simulated() ? "of a simulated station, read from the rig file"
                                       : "read from the rig file, not measured in this session"},

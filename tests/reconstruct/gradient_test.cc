@@ -28,7 +28,10 @@ class Gradient : public testing::TestWithParam<Case> {
 
   ChannelProblem problem_ = random_problem(GetParam());
   testing_support::DirectSolver solver_;
-  Objective objective_{problem_, solver_, {.regularization = GetParam().regularization}};
+  Objective objective_{
+      problem_,
+      solver_,
+      {.regularization = GetParam().regularization, .regularizer = GetParam().regularizer}};
 };
 
 // Each component against its own size. h = 2e-3 leaves h^4 = 2e-11 of truncation; the rounding of J, 1e-15 of it, is

@@ -16,6 +16,7 @@ struct Case {
   Face lit;
   Face seen;
   double regularization;
+  Smoothness regularizer = Smoothness::kH1;
 };
 
 inline std::string case_name(const testing::TestParamInfo<Case>& info) { return info.param.name; }
@@ -76,6 +77,13 @@ inline const auto kEveryLight =
                     Case{"FrontLitCell", kCollimated, kCell, Face::kZMax, Face::kZMax, 0.0},
                     Case{"FrontLitSurface", kSurface, kCentroid, Face::kZMax, Face::kZMax, 0.0},
                     Case{"FromTheSide", kCollimated, kCentroid, Face::kXMax, Face::kYMin, 0.0},
-                    Case{"Regularized", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 2.0});
+                    Case{"Regularized", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 2.0},
+                    Case{"TotalVariation",
+                         kCollimated,
+                         kCentroid,
+                         Face::kZMin,
+                         Face::kZMax,
+                         2.0,
+                         Smoothness::kTotalVariation});
 
 }  // namespace opaline::reconstruct::testing_problem
