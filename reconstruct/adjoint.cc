@@ -76,10 +76,10 @@ diffusion::MediumGradient medium_gradient(const ChannelProblem& problem,
   const bool lit_is_seen = problem.seen_face == problem.lit_face;
   MatrixGradient matrix(problem.block);
   diffusion::MediumGradient gradient(problem.block.cell_count());
+  matrix.gather(fluence, adjoint);
   for (std::size_t m = 0; m < problem.illuminations.size(); ++m) {
     const auto phi = field(fluence, m);
     const auto psi = field(adjoint, m);
-    matrix.gather(phi, psi);
     for (const Face face : kFaces) {
       matrix.gather_face(face,
                          phi,

@@ -24,8 +24,8 @@ class MatrixGradient {
  public:
   explicit MatrixGradient(const Block& block);
 
-  /// Sums one illumination's products inside the block.
-  void gather(std::span<const double> phi, std::span<const double> psi);
+  /// Sums the products of all illuminations inside the block.
+  void gather(const diffusion::FieldBatch& phi, const diffusion::FieldBatch& psi);
   /// Sums its products on one face; `source` (S_f) and `flux_residual` (r_f) may be empty: zero.
   /// For all six faces.
   void gather_face(Face face,
@@ -39,6 +39,7 @@ class MatrixGradient {
               diffusion::MediumGradient& gradient) const;
 
  private:
+  void gather(const double* phi, const double* psi, std::size_t first, std::size_t end);
   void add_inner_faces(std::size_t axis,
                        const diffusion::Medium& medium,
                        diffusion::MediumGradient& gradient) const;

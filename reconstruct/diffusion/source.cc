@@ -11,14 +11,17 @@ constexpr double kSeriesBelow =
     0.05;  // where the closed forms of beta lose more to cancellation than the series to truncation
 
 // Centroid of e^(-t x) on [0, 1], as its distance before the middle.
-double centroid_shift(double t) {
-  if (t < kSeriesBelow) return t / 12.0 - t * t * t / 720.0 + std::pow(t, 5) / 30240.0;
-  return 0.5 - 1.0 / t + 1.0 / std::expm1(t);
+// `left` = e^(-t) and `lost` = 1 - e^(-t): 1 / (e^t - 1) = left / lost.
+double centroid_shift(double t, double left, double lost) {
+  const double s = t * t;
+  if (t < kSeriesBelow) return t * (1.0 / 12.0 - s / 720.0 + s * s / 30240.0);
+  return 0.5 - 1.0 / t + left / lost;
 }
 
-double centroid_shift_slope(double t) {
-  if (t < kSeriesBelow) return 1.0 / 12.0 - t * t / 240.0 + std::pow(t, 4) / 6048.0;
-  return 1.0 / (t * t) + 1.0 / (std::expm1(t) * std::expm1(-t));
+double centroid_shift_slope(double t, double left, double lost) {
+  const double s = t * t;
+  if (t < kSeriesBelow) return 1.0 / 12.0 - s / 240.0 + s * s / 6048.0;
+  return 1.0 / s - left / (lost * lost);
 }
 
 }  // namespace
@@ -62,16 +65,17 @@ FaceSource::RayCell FaceSource::ray_cell(const Medium& medium,
   const double kappa = medium.diffusion[cell];
   const double absorption = medium.absorption[cell];
   const double t = h_ / (3.0 * kappa);
-  const double remaining = arriving * std::exp(-t);
+  const double left = std::exp(-t);
+  const double lost = -std::expm1(-t);
   const bool centroid = options_.deposit == Deposit::kCentroid;
   return {.cell = cell,
           .kappa = kappa,
           .absorption = absorption,
           .albedo = 1.0 - 3.0 * kappa * absorption,
-          .deposited = -arriving * std::expm1(-t),
-          .remaining = remaining,
-          .beta = centroid ? centroid_shift(t) : 0.0,
-          .beta_slope = centroid ? centroid_shift_slope(t) : 0.0};
+          .deposited = arriving * lost,
+          .remaining = arriving * left,
+          .beta = centroid ? centroid_shift(t, left, lost) : 0.0,
+          .beta_slope = centroid ? centroid_shift_slope(t, left, lost) : 0.0};
 }
 
 double FaceSource::first_escape(const RayCell& first) const {
