@@ -1,10 +1,12 @@
 #include "bench/figure.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <fstream>
+#include <string>
 
 namespace opaline::bench {
 
@@ -28,9 +30,15 @@ double median(std::vector<double> values) {
 }
 
 double peak_megabytes() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024.0;
+  return 0.0;
+}
+
+void reset_peak_megabytes() {
+  ::malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";  // VmHWM, proc(5)
 }
 
 }  // namespace opaline::bench

@@ -15,7 +15,9 @@ void print_figure(std::string_view figure,
 /// The middle of at least one value; of an even number the upper of the two.
 double median(std::vector<double> values);
 
-/// What this program has held at most, MB.
+/// What this program has held at most since it began, or since the last reset, MB.
 double peak_megabytes();
+/// Gives free memory back and counts from here.
+void reset_peak_megabytes();
 
 }  // namespace opaline::bench

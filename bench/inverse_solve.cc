@@ -20,6 +20,7 @@
 #include "bench/forward/forward_case.h"
 #include "bench/inverse/finite_elements.h"
 #include "bench/inverse/material_cases.h"
+#include "bench/inverse/timed_solver.h"
 #include "bench/inverse/transport_dataset.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/channel_problem.h"
@@ -110,7 +111,8 @@ Result<Case> make_case(const std::string& name) {
   }
   if (!name.ends_with(".transport")) {
     return invalid_argument(
-        fmt::format("no case '{}'; there are 24x24x6, 48x48x12, 96x96x24, wax1 and marble, each also with -n8 after it, "
+        fmt::format("no case '{}'; there are 24x24x6, 48x48x12, 96x96x24, wax1 and marble, each "
+                    "also with -n8 after it, "
                     "{} and *.transport files",
                     name,
                     fmt::join(material_case_names(), ", ")));
@@ -202,6 +204,7 @@ Result<void> compare_with_published(const Case& which,
                                     FluenceSolver& solver) {
   options.method = reconstruct::Method::kAsPublished;
   options.max_iterations = kPublishedIterations;
+  options.coarser_grids = 0;
   options.stalled = 0.0;
   NullSink events;
   const SystemClock clock;
@@ -240,8 +243,10 @@ Result<void> run(const Case& which,
   if (!solver) return solver.error();
   NullSink events;
   const SystemClock clock;
+  TimedSolver timed(**solver);
+  reset_peak_megabytes();
   const auto result =
-      reconstruct::reconstruct_material(dataset, options, {**solver, events, clock}, {});
+      reconstruct::reconstruct_material(dataset, options, {timed, events, clock}, {});
   if (!result) return result.error();
   for (std::size_t c = 0; c < kColorChannels; ++c) {
     const auto& channel = result->channels[c];
@@ -252,6 +257,7 @@ Result<void> run(const Case& which,
   }
   print_figure("inverse.solves", which.name, effort_of(*result).solves, "1");
   print_figure("inverse.seconds", which.name, result->seconds, "s");
+  print_figure("inverse.share_of_solver", which.name, timed.seconds() / result->seconds, "1");
   print_figure("inverse.peak_mb", which.name, peak_megabytes(), "MB");
   const double margin = result->direct_light_margin_mm;
   if (margin > 0.0) print_figure("inverse.direct_light_margin", which.name, margin, "mm");
@@ -312,8 +318,16 @@ int main(int argc, char** argv) try {
   app.add_option("--stalled", options.stalled);
   app.add_option("--tolerance", options.tolerance);
   app.add_option("--max-iterations", options.max_iterations);
+  app.add_option("--coarser-grids", options.coarser_grids);
+  options.model = reconstruct::Model::kHeterogeneous;
+  bool ladder = false;
+  app.add_flag("--ladder", ladder, "From homogeneous on, as a session does by default");
+  bool gauss_newton = false;
+  app.add_flag("--gauss-newton", gauss_newton, "Gauss-Newton-CG, not L-BFGS");
   app.add_option("--threads", options.threads);
   CLI11_PARSE(app, argc, argv);
+  if (ladder) options.model = reconstruct::Model::kAuto;
+  if (gauss_newton) options.method = reconstruct::Method::kGaussNewton;
   if (edges) options.regularizer = reconstruct::Smoothness::kTotalVariation;
   return bench::run_all(names, data, options, published);
 } catch (const std::exception& error) {

@@ -21,10 +21,10 @@ using reconstruct::InverseOptions;
 constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
-constexpr std::array<std::string_view, 2> kMethodNames{"lbfgs", "as_published"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 4> kModelNames{
     "auto", "homogeneous", "layered", "heterogeneous"};
+constexpr std::array<std::string_view, 3> kMethodNames{"lbfgs", "gauss_newton", "as_published"};
 constexpr std::array<std::string_view, 2> kSmoothnessNames{"h1", "tv"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
@@ -119,6 +119,9 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.one_of({"model", "of the sample; auto: as much as the held-out lights ask for"},
                 r.model,
                 kModelNames);
+  fields.whole({"coarser_grids", "that the answer is found on first"},
+               r.coarser_grids,
+               Range::between(0, 10));
   fields.whole({"max_iterations", "per channel and model; 0: the homogeneous fit"},
                r.max_iterations,
                Range::between(0, 100000));

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "base/log.h"
+#include "reconstruct/coarse_grid.h"
+#include "reconstruct/coarse_start.h"
 #include "reconstruct/fallback_solver.h"
 #include "reconstruct/published_step.h"
 
@@ -61,17 +64,25 @@ Result<Evaluation> ChannelSolver::evaluate(std::span<const double> x, std::stop_
   return at;
 }
 
-Result<ChannelSolver::WarmStart> ChannelSolver::homogeneous_start(std::stop_token stop) {
+Result<ChannelSolver::WarmStart> ChannelSolver::start(std::stop_token stop) const {
+  const bool full = parametrization_ == Parametrization::full(problem_.block);
+  if (full && options_.coarser_grids > 0 && options_.max_iterations > 0 &&
+      options_.method != Method::kAsPublished) {
+    if (const auto coarse = coarser_block(problem_.block))
+      return coarse_start(problem_, *coarse, options_, warm_, solver_, clock_, std::move(stop));
+  }
+  if (warm_) return *warm_;
   const auto fit = fit_homogeneous(problem_, options_, solver_, std::move(stop));
   if (!fit) return fit.error().in("homogeneous fit");
   const std::size_t cells = problem_.block.cell_count();
   WarmStart warm{*fit, std::vector<double>(cells, std::log(fit->reduced_scattering)), fit->solves};
+  warm.homogeneous.chi_squared = 0.0;  // of a few pictures
   warm.cell_values.resize(2 * cells, std::log(fit->absorption));
   return warm;
 }
 
 Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
-  auto warm = warm_ ? Result<WarmStart>(*warm_) : homogeneous_start(stop);
+  auto warm = start(stop);
   if (!warm) return warm.error();
   solves_before_ = warm->solves;
   ChannelProgress progress;
@@ -83,7 +94,9 @@ Result<ChannelProgress> ChannelSolver::begin(std::stop_token stop) {
   auto at = evaluate(progress.state.x, stop);
   if (!at) return at.error();
   progress.state.at = *std::move(at);
-  if (!warm_) warm->homogeneous.chi_squared = progress.state.at.chi_squared;
+  progress.state.pairs = std::move(warm->pairs);
+  if (warm->homogeneous.chi_squared == 0.0)
+    warm->homogeneous.chi_squared = progress.state.at.chi_squared;
   progress.report.homogeneous = warm->homogeneous;
   record(progress);
   return progress;
@@ -114,6 +127,11 @@ Result<StepOutcome> ChannelSolver::step(LbfgsState& state,
   if (options_.method == Method::kLbfgs) {
     return lbfgs_step(state, box, {}, objective, std::move(stop));
   }
+  if (options_.method == Method::kGaussNewton) {
+    auto product = hessian(state.x, stop);
+    if (!product) return product.error();
+    return gauss_newton_step(state, box, {}, objective, *product, std::move(stop));
+  }
   const auto value = [this](std::span<const double> x, std::stop_token token) {
     return objective_.value(parametrization_.expand(x), std::move(token));
   };
@@ -142,6 +160,20 @@ Result<void> ChannelSolver::read_back(ChannelProgress& progress) {
   progress.state = *std::move(state);
   read_back_ = progress;
   return ok();
+}
+
+// P^T H P at x.
+Result<HessianProduct> ChannelSolver::hessian(std::span<const double> x,
+                                              const std::stop_token& stop) {
+  auto tangent = objective_.tangent(parametrization_.expand(x), stop);
+  if (!tangent) return tangent.error();
+  return HessianProduct(
+      [this, at = std::make_shared<Tangent>(*std::move(tangent))](
+          std::span<const double> v, const std::stop_token& token) -> Result<std::vector<double>> {
+        const auto product = objective_.hessian_product(*at, parametrization_.expand(v), token);
+        if (!product) return product.error();
+        return parametrization_.gather(*product);
+      });
 }
 
 Result<void> ChannelSolver::iterate(ChannelProgress& progress, std::stop_token stop) {

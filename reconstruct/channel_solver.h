@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -10,6 +11,7 @@
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/gauss_newton.h"
 #include "reconstruct/minimiser.h"
 #include "reconstruct/parametrization.h"
 
@@ -32,6 +34,8 @@ class ChannelSolver {
     HomogeneousFit homogeneous;
     std::vector<double> cell_values;  ///< (log sigma_s', log sigma_a), as Objective takes them
     long solves = 0;                  ///< that it took
+    /// What is known of J's curvature by the cell values, oldest first; for a full parametrisation only.
+    std::deque<CurvaturePair> pairs = {};
   };
   ChannelSolver(const ChannelProblem& problem,
                 const InverseOptions& options,
@@ -48,9 +52,10 @@ class ChannelSolver {
 
  private:
   Result<ChannelProgress> begin(std::stop_token stop);
-  Result<WarmStart> homogeneous_start(std::stop_token stop);
+  Result<WarmStart> start(std::stop_token stop) const;
   Result<Evaluation> evaluate(std::span<const double> x, std::stop_token stop);
   Result<StepOutcome> step(LbfgsState& state, const Bounds& box, std::stop_token stop);
+  Result<HessianProduct> hessian(std::span<const double> x, const std::stop_token& stop);
   Result<void> iterate(ChannelProgress& progress, std::stop_token stop);
   Result<void> begin_on_engine(const ChannelProgress& progress);
   Result<void> read_back(ChannelProgress& progress);

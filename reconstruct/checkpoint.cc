@@ -235,6 +235,7 @@ void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
                            static_cast<double>(o.method),
                            static_cast<double>(o.model),
                            static_cast<double>(o.regularizer),
+                           static_cast<double>(o.coarser_grids),
                            static_cast<double>(kFormat)};
   append(bytes, numbers.data(), sizeof numbers);
 }

@@ -39,7 +39,15 @@ std::string_view to_string(BackEnd back_end) {
 }
 
 std::string_view to_string(Method method) {
-  return method == Method::kLbfgs ? "lbfgs" : "as_published";
+  switch (method) {
+    case Method::kLbfgs:
+      return "lbfgs";
+    case Method::kGaussNewton:
+      return "gauss_newton";
+    case Method::kAsPublished:
+      return "as_published";
+  }
+  return "lbfgs";
 }
 
 std::string_view to_string(Model model) {
@@ -57,6 +65,7 @@ Result<void> validate(const InverseOptions& o) {
     return expected("direct_light_paths", o.direct_light_paths, ">= 0");
   if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");
   if (!not_negative(o.regularization)) return expected("regularization", o.regularization, ">= 0");
+  if (o.coarser_grids < 0) return expected("coarser_grids", o.coarser_grids, ">= 0");
   if (o.max_iterations < 0) return expected("max_iterations", o.max_iterations, ">= 0");
   if (!(o.tolerance > 0.0 && o.tolerance < 1.0))
     return expected("tolerance", o.tolerance, "> 0 and < 1");

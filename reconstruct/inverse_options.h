@@ -21,9 +21,10 @@ std::string_view to_string(BackEnd back_end);  ///< "auto" | "host" | "vulkan" |
 /// How the objective is minimised.
 enum class Method : std::uint8_t {
   kLbfgs,        ///< limited-memory BFGS in (log sigma_s', log sigma_a) (reconstruct/lbfgs.h)
+  kGaussNewton,  ///< inexact Gauss-Newton, conjugate gradients inside (reconstruct/gauss_newton.h)
   kAsPublished,  ///< Wang 2008, Table I (reconstruct/published_step.h), for comparison only
 };
-std::string_view to_string(Method method);  ///< "lbfgs" | "as_published"
+std::string_view to_string(Method method);  ///< "lbfgs" | "gauss_newton" | "as_published"
 
 /// How much of a sample may vary.
 enum class Model : std::uint8_t {
@@ -63,8 +64,10 @@ struct InverseOptions {
   Smoothness regularizer = Smoothness::kH1;
   Method method = Method::kLbfgs;
   Model model = Model::kAuto;  ///< Method::kAsPublished takes kAuto for kHeterogeneous
-  int max_iterations = 150;    ///< per channel and model; 0 keeps the homogeneous fit
-  double tolerance = 1e-5;     ///< of every diffusion solve, relative residual; > 0
+  /// That a heterogeneous answer is found on first, each of half the cells an axis (reconstruct/coarse_start.h); >= 0.
+  int coarser_grids = 2;
+  int max_iterations = 150;  ///< per channel and model; 0 keeps the homogeneous fit
+  double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
   /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy (model_error hypot(L, l))^2), the
   /// measured noise and this share of the model's error, which counts generously; 0 to 1.
   double discrepancy = 0.1;

@@ -30,7 +30,8 @@ struct IterationRecord {
   double objective = 0.0;
   double chi_squared_per_datum = 0.0;
   double regularization = 0.0;
-  long solves = 0;  ///< for one right-hand side, of the channel so far
+  /// For one right-hand side, of the channel so far; one on a coarser grid counts as its share of the cells.
+  long solves = 0;
   bool operator==(const IterationRecord&) const = default;
 };
 

@@ -27,7 +27,8 @@ struct InverseContext {
 /// (docs/physics.md):
 ///
 ///   per channel: up the ladder of models (reconstruct/model_ladder.h) as far as the held-out pictures ask for, on each
-///   L-BFGS on Objective over the model's (log sigma_s', log sigma_a), bounded, until chi^2 is what the measured noise makes of it (Morozov 1966, InverseOptions::discrepancy), or no more is
+///   L-BFGS, or the options' method, on Objective over the model's (log sigma_s', log sigma_a), bounded, the cells' from
+///   coarse to fine (reconstruct/coarse_start.h), until chi^2 is what the measured noise makes of it (Morozov 1966, InverseOptions::discrepancy), or no more is
 ///   to be had
 ///
 /// A cancelled or killed call goes on from its last checkpoint. After each checkpoint the solves

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/ensure.h"
+#include "reconstruct/diffusion/medium.h"
 
 namespace opaline::reconstruct {
 
@@ -53,6 +54,7 @@ Objective::Objective(const ChannelProblem& problem,
 }
 
 void Objective::start_afresh() {
+  lit_.reset();
   const auto count = static_cast<int>(problem_.illuminations.size());
   fluence_ = FieldBatch(problem_.block.cell_count(), count);
   adjoint_ = FieldBatch(problem_.block.cell_count(), count);
@@ -152,6 +154,51 @@ Result<std::vector<std::vector<double>>> Objective::predict(const ChannelCoeffic
   if (auto solved = solve_forward(coefficients, stop); !solved) return solved.error();
   observe();
   return radiance_;
+}
+
+Result<Tangent> Objective::tangent(std::span<const double> p, std::stop_token stop) {
+  ENSURE(p.size() == parameter_count());
+  const ChannelCoefficients c = to_coefficients(p);
+  const auto medium = diffusion::make_medium(problem_.block, c, problem_.boundary);
+  if (lit_ && lit_->medium.diffusion == medium.diffusion &&
+      lit_->medium.absorption == medium.absorption) {
+    return Tangent(problem_, solver_, c, fluence_, settings_.tolerance);
+  }
+  auto made = Tangent::at(problem_, solver_, c, settings_.tolerance, std::move(stop));
+  if (made) solves_ += made->solves();
+  return made;
+}
+
+Result<std::vector<double>> Objective::hessian_product(Tangent& tangent,
+                                                       std::span<const double> v,
+                                                       const std::stop_token& stop) {
+  const long before = tangent.solves();
+  const auto moved = tangent.apply(v, stop);
+  if (!moved) return moved.error();
+  auto product = tangent.apply_adjoint(*moved, stop);
+  if (!product) return product;
+  solves_ += tangent.solves() - before;
+  add_regularizer_product(tangent.coefficients(), v, *product);
+  return product;
+}
+
+// dlog kappa = -3 kappa (sigma_s' v_s + sigma_a v_a), dlog sigma_a = v_a.
+void Objective::add_regularizer_product(const ChannelCoefficients& c,
+                                        std::span<const double> v,
+                                        std::span<double> product) const {
+  const std::size_t cells = problem_.block.cell_count();
+  std::vector<double> kappa_move(cells);
+  std::vector<double> log_kappa(cells);
+  for (std::size_t i = 0; i < cells; ++i) {
+    const double extinction = c.reduced_scattering[i] + c.absorption[i];
+    log_kappa[i] = -std::log(3.0 * extinction);
+    kappa_move[i] = -(c.reduced_scattering[i] * v[i] + c.absorption[i] * v[cells + i]) / extinction;
+  }
+  MediumGradient logs(cells);
+  regularizer_.add_product(log_kappa, kappa_move, logs.diffusion);
+  regularizer_.add_product(logarithms(c.absorption), v.subspan(cells), logs.absorption);
+  const std::vector<double> by_parameter = to_parameter_gradient(c, logs);
+  for (std::size_t i = 0; i < product.size(); ++i) product[i] += by_parameter[i];
 }
 
 }  // namespace opaline::reconstruct

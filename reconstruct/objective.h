@@ -12,6 +12,7 @@
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/evaluation.h"
 #include "reconstruct/regularizer.h"
+#include "reconstruct/tangent.h"
 
 namespace opaline::reconstruct {
 
@@ -44,6 +45,14 @@ class Objective {
   Result<std::vector<std::vector<double>>> predict(const ChannelCoefficients& coefficients,
                                                    std::stop_token stop);
 
+  /// The forward model's linearisation at p; no solve where p is what evaluate() was called with last.
+  Result<Tangent> tangent(std::span<const double> p, std::stop_token stop);
+  /// Gauss-Newton's second derivative of J at the tangent's point, times v: J^T J v and the regulariser's
+  /// (Regularizer::add_product on the logarithms' own moves). Two solves an illumination.
+  Result<std::vector<double>> hessian_product(Tangent& tangent,
+                                              std::span<const double> v,
+                                              const std::stop_token& stop);
+
   /// Forgets the fields that solves start from, so that what follows depends on p alone.
   void start_afresh();
   /// Solves for one right-hand side done so far.
@@ -61,6 +70,9 @@ class Objective {
   void regularize(const ChannelCoefficients& coefficients,
                   Evaluation& out,
                   diffusion::MediumGradient& logs) const;
+  void add_regularizer_product(const ChannelCoefficients& c,
+                               std::span<const double> v,
+                               std::span<double> product) const;
 
   const ChannelProblem& problem_;
   diffusion::FluenceSolver& solver_;

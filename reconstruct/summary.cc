@@ -26,6 +26,7 @@ Json to_json(const InverseOptions& o) {
           {"direct_light_paths", o.direct_light_paths},
           {"regularization", o.regularization},
           {"regularizer", to_string(o.regularizer)},
+          {"coarser_grids", o.coarser_grids},
           {"max_iterations", o.max_iterations},
           {"tolerance", o.tolerance},
           {"discrepancy", o.discrepancy},

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <stop_token>
+
+#include "reconstruct/channel_solver.h"
+
+namespace opaline::reconstruct {
+
+/// Where a channel's minimisation starts: the answer on a coarser grid of the same block (reconstruct/coarse_grid.h),
+/// which is found the same way, from still coarser ones while options.coarser_grids allows; the homogeneous fit is on
+/// the coarsest. A coarse grid stops at chi^2 = the number of data, noise and model_error in full: closer, it would
+/// fit its own discretisation. One that is not there after ten iterations cannot see the sample (its cells are some
+/// mean free paths long): its answer is dropped, its homogeneous fit kept.
+///
+/// Brought to the finer grid: the logarithms, trilinear, and what L-BFGS learnt of the curvature, s likewise and y spread
+/// over the finer cells, so that s . y stays what it was and the first step is a good one. Solves are counted in fine
+/// ones, each coarse one for its share of the cells.
+///
+/// `from`, on the fine grid, replaces the homogeneous fit. Errors: ChannelSolver's.
+Result<ChannelSolver::WarmStart> coarse_start(const ChannelProblem& problem,
+                                              const Block& coarse,
+                                              const InverseOptions& options,
+                                              const std::optional<ChannelSolver::WarmStart>& from,
+                                              diffusion::FluenceSolver& solver,
+                                              const Clock& clock,
+                                              std::stop_token stop);
+
+}  // namespace opaline::reconstruct
