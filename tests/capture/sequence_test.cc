@@ -108,6 +108,29 @@ TEST_F(SequenceTest, CapturesEveryRegionAndHeldOutLightIntoADataset) {
   EXPECT_TRUE(fs::exists(dir_.path() / "hdr" / "region_1_1.exr"));
 }
 
+// Regions of 4 x 4 mm on 8 x 8 mm: what is lit or within 1.5 mm of it is left out, by the distance of a cell's middle
+// to the rectangle.
+TEST_F(SequenceTest, LeavesOutWhatIsLitDirectlyWhereTheLitFaceIsSeen) {
+  task_.sample.lit_face = task_.sample.seen_face;
+  task_.options.direct_light_margin_mm = 1.5;
+  ASSERT_TRUE(run(dir_.path()));
+  const auto set = read_dataset(dir_.path());
+  ASSERT_TRUE(set) << set.error().message;
+  for (int region = 0; region < 4; ++region) {
+    const Illumination& light = set->illuminations[static_cast<std::size_t>(region)];
+    const double left = 4.0 * (region % 2);
+    const double top = 4.0 * (region / 2);
+    for (int y = 0; y < 8; ++y) {
+      for (int x = 0; x < 8; ++x) {
+        const double dx = std::max({0.0, left - (x + 0.5), x + 0.5 - (left + 4.0)});
+        const double dy = std::max({0.0, top - (y + 0.5), y + 0.5 - (top + 4.0)});
+        const bool kept = std::hypot(dx, dy) > 1.5;
+        EXPECT_EQ(light.mask.at(x, y), kept ? 1 : 0) << light.name << " " << x << ", " << y;
+      }
+    }
+  }
+}
+
 // The rig's truth under each region against what was measured: how well, the next test says.
 TEST_F(SequenceTest, MeasuresTheRadianceTheSampleSends) {
   options_.camera.psf_sigma_px = 0.0;

@@ -42,8 +42,12 @@ class SessionConfigTest : public ::testing::Test {
 };
 
 TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
-  for (const char* name :
-       {"sim.toml", "sim-rig.toml", "session.example.toml", "rig.example.toml"}) {
+  for (const char* name : {"sim.toml",
+                           "sim-rig.toml",
+                           "sim_front_lit.toml",
+                           "sim-rig-front-lit.toml",
+                           "session.example.toml",
+                           "rig.example.toml"}) {
     const auto problems = check(config_file(name));
     ASSERT_TRUE(problems) << problems.error().message;
     EXPECT_THAT(*problems, IsEmpty()) << to_string(*problems);
