@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "reconstruct/direct_light.h"
 #include "reconstruct/inverse_solver.h"
 #include "reconstruct/prediction.h"
 #include "reconstruct/regrid.h"
@@ -19,8 +20,9 @@ Result<void> put_back(const Dataset& dataset,
   auto pictures = predict(dataset, result.material, options, solver, std::move(stop));
   if (!pictures) return pictures.error();
   result.predicted = *std::move(pictures);
-  result.fitted = relighting_error(dataset, result.predicted, false);
-  result.held_out = relighting_error(dataset, result.predicted, true);
+  const Dataset counted = without_direct_light(dataset, result.direct_light_margin_mm);
+  result.fitted = relighting_error(counted, result.predicted, false);
+  result.held_out = relighting_error(counted, result.predicted, true);
   return ok();
 }
 
