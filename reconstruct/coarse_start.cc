@@ -101,7 +101,8 @@ Result<WarmStart> coarse_start(const ChannelProblem& problem,
   if (!progress)
     return progress.error().in(fmt::format("{} x {} x {} cells", coarse.nx, coarse.ny, coarse.nz));
   const long solves = fine_solves(coarse, fine, progress->report.solves);
-  if (progress->report.stop_reason != StopReason::kDiscrepancy)
+  const bool moved = progress->report.history.back().iteration > 0;
+  if (!moved || progress->report.stop_reason != StopReason::kDiscrepancy)
     return without_answer(from, progress->report.homogeneous, solves, fine);
   WarmStart warm{progress->report.homogeneous,
                  transferred(prolonged, coarse, fine, progress->state.x),

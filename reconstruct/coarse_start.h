@@ -11,7 +11,7 @@ namespace opaline::reconstruct {
 /// which is found the same way, from still coarser ones while options.coarser_grids allows; the homogeneous fit is on
 /// the coarsest. A coarse grid stops at chi^2 = the number of data, noise and model_error in full: closer, it would
 /// fit its own discretisation. One that is not there after ten iterations cannot see the sample (its cells are some
-/// mean free paths long): its answer is dropped, its homogeneous fit kept.
+/// mean free paths long): its answer is dropped, its homogeneous fit kept. Where `from` is there already, it stays as it is.
 ///
 /// Brought to the finer grid: the logarithms, trilinear, and what L-BFGS learnt of the curvature, s likewise and y spread
 /// over the finer cells, so that s . y stays what it was and the first step is a good one. Solves are counted in fine

@@ -1,0 +1,95 @@
+#include "reconstruct/coarse_start.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/coarse_grid.h"
+#include "reconstruct/diffusion/reference_solver.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+constexpr Block kBlock{12, 10, 8, 0.4, 0.4, 0.4};
+
+// A heterogeneous sample's own pictures under two lights, each datum weighted as of this relative error.
+class CoarseStart : public testing::Test {
+ protected:
+  CoarseStart() {
+    for (std::size_t i = 0; i < kBlock.cell_count(); ++i) {
+      const double x = static_cast<double>(i % kBlock.nx);
+      truth_.reduced_scattering.push_back(1.0 + 0.3 * std::sin(0.5 * x));
+      truth_.absorption.push_back(0.02);
+    }
+  }
+
+  ChannelProblem problem_of(double relative_error) {
+    const std::size_t face = kBlock.face_cell_count(Face::kZMax);
+    const auto boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, 1.3);
+    ChannelProblem problem{
+        .block = kBlock,
+        .boundary = boundary,
+        .source = {},
+        .camera = std::vector(face, diffusion::camera_equation(1.3, boundary, 1.0)),
+        .illuminations = std::vector<ChannelIllumination>(2),
+        .data_count = 2 * face};
+    for (std::size_t m = 0; m < 2; ++m) {
+      auto& q = problem.illuminations[m].irradiance;
+      q.assign(face, 0.0);
+      for (std::size_t f = 0; f < face; ++f) q[f] = (f % kBlock.nx < 6) == (m == 0) ? 1.0 : 0.0;
+    }
+    const auto pictures = *Objective(problem, *solver_, {}).predict(truth_, {});
+    for (std::size_t m = 0; m < 2; ++m) {
+      problem.illuminations[m].radiance = pictures[m];
+      for (const double l : pictures[m])
+        problem.illuminations[m].weight.push_back(1.0 / std::pow(relative_error * l, 2));
+    }
+    return problem;
+  }
+
+  Result<ChannelSolver::WarmStart> start(const ChannelProblem& problem,
+                                         const std::optional<ChannelSolver::WarmStart>& from) {
+    return coarse_start(problem, *coarser_block(kBlock), {}, from, *solver_, clock_, {});
+  }
+
+  std::unique_ptr<diffusion::FluenceSolver> solver_ = diffusion::make_reference_solver();
+  SystemClock clock_;
+  ChannelCoefficients truth_;
+};
+
+TEST_F(CoarseStart, LeavesAnAnswerAloneThatExplainsThePictures) {
+  const ChannelProblem problem = problem_of(0.2);
+  const ChannelSolver::WarmStart known{{}, to_parameters(truth_), 7};
+  const auto warm = start(problem, known);
+  ASSERT_TRUE(warm) << warm.error().message;
+  EXPECT_EQ(warm->cell_values, known.cell_values);
+  EXPECT_GT(warm->solves, 7);
+}
+
+// Pictures to a part in a million: the coarse grid's own error is some thousand times that.
+TEST_F(CoarseStart, DropsTheAnswerOfAGridThatCannotSeeTheSample) {
+  const auto warm = start(problem_of(1e-6), std::nullopt);
+  ASSERT_TRUE(warm) << warm.error().message;
+  const auto [low, high] = std::minmax_element(
+      warm->cell_values.begin(),
+      warm->cell_values.begin() + static_cast<std::ptrdiff_t>(kBlock.cell_count()));
+  EXPECT_EQ(*low, *high);
+  EXPECT_NEAR(*low, std::log(warm->homogeneous.reduced_scattering), 1e-12);
+}
+
+TEST_F(CoarseStart, BringsWhatTheCoarseGridFoundToTheFineOne) {
+  const ChannelProblem problem = problem_of(0.01);
+  const auto warm = start(problem, std::nullopt);
+  ASSERT_TRUE(warm) << warm.error().message;
+  Objective objective(problem, *solver_, {});
+  const auto homogeneous = to_parameters(
+      {std::vector<double>(kBlock.cell_count(), warm->homogeneous.absorption),
+       std::vector<double>(kBlock.cell_count(), warm->homogeneous.reduced_scattering)});
+  EXPECT_LT(objective.evaluate(warm->cell_values, {})->chi_squared,
+            objective.evaluate(homogeneous, {})->chi_squared);
+  EXPECT_FALSE(warm->pairs.empty());
+}
+
+}  // namespace
+}  // namespace opaline::reconstruct
