@@ -97,6 +97,7 @@ Result<void> upload(Context& context, std::span<const std::byte> from, Buffer& t
   auto staging = Buffer::create(context, from.size(), Memory::kHost);
   if (!staging) return staging.error();
   std::ranges::copy(from, staging->mapped().begin());
+  context.handles().traffic.uploaded_bytes += from.size();
   return run_copy(context, *staging, to, from.size());
 }
 
@@ -106,6 +107,7 @@ Result<void> download(Context& context, const Buffer& from, std::span<std::byte>
   if (!staging) return staging.error();
   if (auto copied = run_copy(context, from, *staging, to.size()); !copied) return copied.error();
   std::ranges::copy(staging->mapped(), to.begin());
+  context.handles().traffic.downloaded_bytes += to.size();
   return ok();
 }
 

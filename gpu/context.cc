@@ -61,6 +61,8 @@ Result<std::unique_ptr<Context>> Context::create(const ContextOptions& options) 
 
 const DeviceInfo& Context::device() const { return handles_->info; }
 
+const Traffic& Context::traffic() const { return handles_->traffic; }
+
 std::uint64_t Context::memory_left() const {
   return handles_->info.memory_bytes - handles_->allocated_bytes;
 }
@@ -78,7 +80,8 @@ Result<std::uint64_t> Context::submit(const Commands& commands) {
     const vk::CommandBufferSubmitInfo buffer(*commands.handles().commands);
     const vk::SemaphoreSubmitInfo signal(
         *h.timeline, h.submitted + 1, vk::PipelineStageFlagBits2::eAllCommands);
-    if (++h.submissions == h.options.rehearsal.lost_at_submission) throw vk::DeviceLostError("");
+    const auto lost_at = static_cast<std::uint64_t>(h.options.rehearsal.lost_at_submission);
+    if (++h.traffic.submissions == lost_at) throw vk::DeviceLostError("");
     h.queue.submit2(vk::SubmitInfo2({}, {}, buffer, signal));
   });
   if (!sent) {

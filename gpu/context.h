@@ -36,6 +36,13 @@ struct ContextOptions {
   static bool validation_from_environment();
 };
 
+/// What went to and from a device so far, by upload() and download().
+struct Traffic {
+  std::uint64_t uploaded_bytes = 0;
+  std::uint64_t downloaded_bytes = 0;
+  std::uint64_t submissions = 0;  ///< of commands, those for the copies included
+};
+
 /// A Vulkan device with one queue and the timeline of what was submitted to it.
 ///
 ///   created -> (submit, wait)* -> destroyed
@@ -57,6 +64,7 @@ class Context {
   const DeviceInfo& device() const;
   /// What is left of the device's memory, as far as this context's own buffers are concerned.
   std::uint64_t memory_left() const;
+  const Traffic& traffic() const;
 
   /// Sends recorded commands to the device and waits for them until the options' deadline.
   /// Work that was submitted cannot be recalled: submit little at a time and look at a stop token

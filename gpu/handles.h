@@ -48,8 +48,8 @@ struct Context::Handles {
   std::uint32_t queue_family = 0;
   std::uint64_t submitted = 0;        ///< the timeline's value when all is done
   std::uint64_t allocated_bytes = 0;  ///< of all buffers
-  int submissions = 0;
   int allocations = 0;
+  Traffic traffic;
   bool lost = false;  ///< a deadline passed or the device is gone
   DeviceInfo info;
   ContextOptions options;

@@ -428,6 +428,22 @@ TEST_F(DeviceSpaceTest, TakesTheStepsOfTheHostsVectors) {
   EXPECT_EQ(products.size(), device.pairs.size());
 }
 
+// Vectors and fields move neither way; what is read, one block of scalars a submission, lies where the host sees it.
+TEST_F(DeviceSpaceTest, SendsAndFetchesNoVectorsDuringItsSteps) {
+  std::deque<PairProducts> products;
+  ASSERT_TRUE(space_->load(start_, *objective_, products));
+  const gpu::Traffic before = device_.context->traffic();
+  EXPECT_GT(before.uploaded_bytes, 0U);
+  const long solves = objective_->solves();
+  for (int step = 0; step < 3; ++step)
+    ASSERT_EQ(*lbfgs_step(*space_, products, {.memory = kMemory}, {}), StepOutcome::kMoved);
+  const gpu::Traffic& after = device_.context->traffic();
+  EXPECT_EQ(after.uploaded_bytes, before.uploaded_bytes);
+  EXPECT_EQ(after.downloaded_bytes, before.downloaded_bytes);
+  EXPECT_GE(objective_->solves(), solves + 3 * 2 * kCases[3].illuminations);
+  EXPECT_GT(after.submissions, before.submissions);
+}
+
 // What is read back is all that matters: a minimisation that went on from it takes the same steps to the last bit.
 TEST_F(DeviceSpaceTest, GoesOnTheSameFromWhatWasReadBack) {
   const LbfgsOptions options{.memory = kMemory};

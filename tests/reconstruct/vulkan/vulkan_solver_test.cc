@@ -133,6 +133,24 @@ TEST(VulkanSolver, SolvesInTurnsWhatOneBindingDoesNotHold) {
   EXPECT_EQ(groups_that_fit(device, 1000), 0);
 }
 
+// Nine right-hand sides, four to a group: in one turn, in three by the binding, in three by the memory. A turn stops when
+// all of its own have converged, to 1e-8.
+TEST(VulkanSolver, IsTheSameInTurnsAsAtOnce) {
+  const Block block{17, 33, 5, 0.5, 0.4, 0.3};
+  const std::uint64_t field = 16 * block.cell_count();
+  const Medium medium = random_medium(block, 30.0, 4);
+  const FieldBatch b = random_fields(block, 9, 5);
+  const FieldBatch at_once = solve(*make(), medium, b);
+  for (const gpu::Rehearsal& small :
+       {gpu::Rehearsal{.max_binding_bytes = field}, gpu::Rehearsal{.memory_bytes = 13 * field}}) {
+    VulkanOptions options{tests::validated()};
+    options.gpu.rehearsal = small;
+    auto solver = make_vulkan_solver(options);
+    ASSERT_TRUE(solver) << solver.error().message;
+    EXPECT_LE(worst_difference(solve(**solver, medium, b), at_once), 1e-6);
+  }
+}
+
 TEST(VulkanSolver, RefusesABlockThatTheDeviceCannotHoldAndSaysWhatElseThereIs) {
   const auto vulkan = make();
   const Block block{1024, 1024, 9, 0.5, 0.5, 0.5};  // 144 MiB a field of four; lavapipe binds 128
