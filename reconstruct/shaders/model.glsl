@@ -9,7 +9,7 @@ layout(push_constant) uniform Push {
   ivec4 face;    // which face (0 x_min ... 5 z_max), groups of four, the seen face where face is the lit one
   vec4 size;     // hx hy hz, and their product V
   vec4 surface;  // 2 A; 4 / (1 - R_phi)
-  vec4 smoothness;  // lambda a / (h l) of faces across x, y, z
+  vec4 smoothness;  // lambda a / (h l) of faces across x, y, z; and 1 / e^2 of total variation, over lambda V / l
 } push;
 
 const int kCollimated = 1;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "reconstruct/diffusion/conjugate_gradient.h"
+#include "reconstruct/regularizer.h"
 
 namespace opaline::reconstruct::vulkan {
 namespace {
@@ -20,6 +21,7 @@ enum Work : std::size_t {
   kRayCells,
   kCellProducts,
   kRayGradient,
+  kEdgeWeights,
   kLitTerms,
   kSeenTerms,
   kCamera
@@ -76,8 +78,8 @@ Values lanes_of(const ChannelProblem& problem,
 }
 
 std::uint64_t with_coarser(std::uint64_t bytes) { return bytes * 8 / 7; }
-/// Matrices, sinks and coefficients; rays, products and ray terms.
-std::uint64_t bytes_of_cell() { return with_coarser(52) + 8 + 16 + 16 + 8; }
+/// Matrices, sinks and coefficients; rays, products, ray terms and the prior's weights.
+std::uint64_t bytes_of_cell() { return with_coarser(52) + 8 + 16 + 16 + 8 + 8; }
 /// r and z of all grids; p, q, d and b.
 std::uint64_t bytes_of_group() { return with_coarser(32) + 64; }
 constexpr std::uint64_t kSolutionBytes =
@@ -194,6 +196,7 @@ Result<void> DeviceObjective::allocate_work() {
                                     16 * cells,
                                     16 * cells,
                                     8 * cells,
+                                    8 * cells,
                                     4 * lit,
                                     4 * problem_.camera.size()}) {
     auto made = gpu::Buffer::create(context, bytes, gpu::Memory::kDevice);
@@ -240,6 +243,10 @@ ModelPush DeviceObjective::push_for(Face face, std::int32_t flags) const {
     push.smoothness[axis] = static_cast<float>(settings_.regularization * block.cell_volume() /
                                                (h[axis] * h[axis] * length * scale_));
   }
+  const double whole = settings_.regularization * block.cell_volume() / (length * scale_);
+  if (settings_.regularizer == Smoothness::kTotalVariation && whole > 0.0)
+    push.smoothness[3] =
+        static_cast<float>(length * length / (Regularizer::kEdge * Regularizer::kEdge * whole));
   push.size[3] = static_cast<float>(block.cell_volume());
   push.surface = {static_cast<float>(2.0 * problem_.boundary.a),
                   static_cast<float>(problem_.boundary.source_scale),
@@ -364,6 +371,10 @@ Result<void> DeviceObjective::evaluate(const gpu::Buffer& p,
     auto done = take_turn(turns_[t], solutions, t == 0 ? kFirst : 0, sums, stop);
     if (!done) return done;
   }
+  run(ModelKernel::kEdges,
+      {&p, &coefficients, &work_[kEdgeWeights], &sums.partials()},
+      push,
+      kSumGroups);
   run(ModelKernel::kGradient,
       {&p,
        &coefficients,
@@ -371,10 +382,10 @@ Result<void> DeviceObjective::evaluate(const gpu::Buffer& p,
        &work_[kRayGradient],
        &work_[kLitTerms],
        &work_[kSeenTerms],
-       &gradient,
-       &sums.partials()},
+       &work_[kEdgeWeights],
+       &gradient},
       push,
-      kSumGroups);
+      workgroups(problem_.block.cell_count()));
   return recorder_.error() ? Result<void>(*recorder_.error()) : ok();
 }
 

@@ -12,7 +12,7 @@
 namespace opaline::reconstruct::vulkan {
 
 /// The objective of reconstruct/objective.h with the gradient of reconstruct/gradient.h on the device, for the whole
-/// parametrization and the H1 prior: the matrices, the light, both solves, the camera, the adjoint's gradient and the prior; only scalars leave it.
+/// parametrization and both priors: the matrices, the light, both solves, the camera, the adjoint's gradient and the prior; only scalars leave it.
 ///
 /// Numbers are float32 but for what would lose digits: fluence and adjoint are kept, and their residual taken, in twice
 /// float32's digits (device_passes.h), sums for the processor too (sums.h); no float64 is asked of the device. Light is
@@ -25,6 +25,7 @@ class DeviceObjective {
   struct Settings {
     double tolerance = 1e-5;
     double regularization = 0.0;
+    Smoothness regularizer = Smoothness::kH1;
   };
   /// Plans with the memory that is left now. The problem and the kernels outlive it.
   static Result<std::unique_ptr<DeviceObjective>> create(Recorder& recorder,
@@ -99,7 +100,7 @@ class DeviceObjective {
   std::vector<DeviceFields> fields_;  // one, for the largest turn
   std::vector<Turn> turns_;
   std::vector<Solutions> solutions_;  // one a turn, or one for all
-  // b; rays; products; ray terms; terms of the lit and of the seen face; camera gains
+  // b; rays; products; ray terms; the prior's weights; terms of the lit and of the seen face; camera gains
   std::vector<gpu::Buffer> work_;
 };
 

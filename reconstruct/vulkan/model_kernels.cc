@@ -30,6 +30,7 @@ std::array<Source, static_cast<std::size_t>(ModelKernel::kCount)> sources() {
            {"gather", shaders::gather_comp, 5, kModel},
            {"rim_terms", shaders::rim_terms_comp, 5, kModel},
            {"ray_terms", shaders::ray_terms_comp, 7, kModel},
+           {"edges", shaders::edges_comp, 4, kModel},
            {"gradient", shaders::gradient_comp, 8, kModel},
            {"combine", shaders::combine_comp, 8, kVectors},
            {"move", shaders::move_comp, 4, kVectors},

@@ -43,6 +43,7 @@ enum class ModelKernel : std::uint8_t {
   kGather,
   kRimTerms,
   kRayTerms,
+  kEdges,
   kGradient,
   kCombine,
   kMove,

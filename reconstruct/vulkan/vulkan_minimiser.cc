@@ -37,8 +37,12 @@ Result<std::unique_ptr<VulkanMinimiser>> VulkanMinimiser::create(gpu::Context& c
                                    made->options_.memory);
   if (!space) return space.error();
   made->space_ = *std::move(space);
-  auto objective = DeviceObjective::create(
-      made->recorder_, kernels, model, problem, {options.tolerance, options.regularization});
+  auto objective =
+      DeviceObjective::create(made->recorder_,
+                              kernels,
+                              model,
+                              problem,
+                              {options.tolerance, options.regularization, options.regularizer});
   if (!objective) return objective.error();
   made->objective_ = *std::move(objective);
   auto loaded = made->space_->load(from, *made->objective_, made->products_);

@@ -30,6 +30,7 @@ struct Case {
   Face seen;
   int illuminations;
   double brightness;  // of the light: any unit will do
+  Smoothness prior = Smoothness::kH1;
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -94,6 +95,15 @@ const Case kCases[] = {{"OneCell",
                         Face::kYMin,
                         9,
                         1.0},
+                       {"TotalVariation",
+                        {17, 33, 5, 0.5, 0.4, 0.3},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kZMin,
+                        Face::kZMax,
+                        2,
+                        1.0,
+                        Smoothness::kTotalVariation},
                        {"Rows",
                         {1, 130, 3, 0.5, 0.5, 0.5},
                         kCollimatedLight,
@@ -234,12 +244,14 @@ TEST_P(DeviceObjectiveTest, AgreesWithTheHostsValueAndGradient) {
   const ChannelProblem problem = random_problem(GetParam());
   const std::vector<double> p = to_parameters(random_coefficients(problem.block.cell_count(), 3));
   const auto solver = host::make_host_solver({.threads = 1});
-  Objective host(problem, *solver, {.tolerance = 1e-10, .regularization = 30.0});
+  const Smoothness prior = GetParam().prior;
+  Objective host(
+      problem, *solver, {.tolerance = 1e-10, .regularization = 30.0, .regularizer = prior});
   const Evaluation truth = *host.evaluate(p, {});
   Device device;
   Recorder recorder = device.recorder();
-  auto objective =
-      DeviceObjective::create(recorder, device.kernels[0], device.model[0], problem, {1e-7, 30.0});
+  auto objective = DeviceObjective::create(
+      recorder, device.kernels[0], device.model[0], problem, {1e-7, 30.0, prior});
   ASSERT_TRUE(objective) << objective.error().message;
   for (int again = 0; again < 2; ++again) {  // from darkness, and from the last fields
     const auto at = evaluate(device, **objective, recorder, p);
