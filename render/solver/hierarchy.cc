@@ -47,7 +47,7 @@ double largest_eigenvalue(const LaneMatrix<T>& a, const std::vector<Lanes<T>>& i
     const Lanes<T> ratio = divide(size, before);
     largest =
         std::sqrt(std::max({static_cast<double>(ratio[0]), double(ratio[1]), double(ratio[2])}));
-    Lanes<T> scale;
+    Lanes<T> scale{};
     for (int lane = 0; lane < kLanes; ++lane)
       scale.set(lane, size[lane] > 0 ? 1 / std::sqrt(size[lane]) : T{0});
     for (int i = 0; i < a.rows(); ++i) x[i] = y[i] * scale;

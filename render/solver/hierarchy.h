@@ -12,7 +12,7 @@ namespace opaline::render {
 struct HierarchyOptions {
   double strength = 0.06;   ///< of couplings that make a group; halved at every coarser level
   int first_rings = 2;      ///< reach of the finest groups; coarser ones reach one ring
-  int smoothing_steps = 2;  ///< Chebyshev steps before and after each correction; >= 1
+  int smoothing_steps = 1;  ///< Chebyshev steps before and after each correction; >= 1
   int coarsest_rows = 160;  ///< solved directly
 };
 

@@ -37,7 +37,7 @@ double relative(const Lanes<T>& r2, const Lanes<T>& b2) {
 
 template <class T>
 void clear_dark_channels(const Lanes<T>& b2, std::vector<Lanes<T>>& x) {
-  Lanes<T> lit;
+  Lanes<T> lit{};
   for (int lane = 0; lane < kLanes; ++lane) lit.set(lane, b2[lane] > 0 ? T{1} : T{0});
   if (lit[0] * lit[1] * lit[2] > 0) return;
   for (Lanes<T>& value : x) value *= lit;

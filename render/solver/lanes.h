@@ -18,7 +18,7 @@ struct Lanes {
   Register part[kRegisters];
 
   static Lanes all(T value) {
-    Lanes lanes;
+    Lanes lanes{};
     for (int r = 0; r < kRegisters; ++r) lanes.part[r] = Register{} + value;
     return lanes;
   }

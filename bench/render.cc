@@ -1,0 +1,247 @@
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/log.h"
+#include "bench/figure.h"
+#include "bench/render/render_case.h"
+#include "bench/render/sphere_error.h"
+#include "render/graph/relaxation.h"
+#include "render/mesh/mesh_distance.h"
+#include "render/tetrahedra/stuffing.h"
+
+// render: how accurate and how fast the renderer's numerical ground is, as JSON lines. Groups of figures, all by default:
+//   sphere     error against the exact solution of a lit sphere, graph and finite elements
+//   mesh       seconds from a triangle mesh to a graph with its hierarchy; angles
+//   frames     frames a second of the diffusion pass, a light moving 2 degrees a frame; processor seconds of one such frame on
+//              one thread, which a busy machine hardly slows; iterations saved by warm starts, of the light and of a brush
+//              (sigma_a times 1.1 in a ball of 4 mm a frame)
+//   published  error against forty plain relaxation sweeps a level, in the processor time they take
+//   growth     processor time per node of a cold solve, from 100 k to 1 M nodes
+
+namespace {
+
+namespace bench = opaline::bench;
+namespace render = opaline::render;
+using opaline::ThreadTeam;
+using opaline::Vec3;
+
+constexpr double kTolerance = 1e-3;
+constexpr int kThreads = 2;
+constexpr int kRemembered = 4;
+
+double cpu_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+class Stopwatch {
+ public:
+  double cpu() const { return cpu_seconds() - cpu_start_; }  ///< of all threads
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double cpu_start_ = cpu_seconds();
+};
+
+void measure_sphere() {
+  ThreadTeam team(kThreads);
+  const auto sphere = bench::shape("sphere");
+  for (const auto& [name, tets] : {std::pair{"13k", 13e3}, std::pair{"52k", 52e3}}) {
+    const render::TetMesh mesh = bench::cut(*sphere, tets);
+    bench::print_figure("render.sphere_tets", name, static_cast<double>(mesh.tets.size()), "1");
+    bench::print_figure("render.sphere_rms_graph", name, bench::graph_error(mesh, team), "1");
+    bench::print_figure("render.sphere_rms_fem", name, bench::elements_error(mesh, team), "1");
+  }
+}
+
+void measure_mesh() {
+  ThreadTeam team(kThreads);
+  const render::TriangleMesh surface =
+      render::surface_mesh(bench::cut(*bench::shape("torus"), 1.3e6));
+  bench::print_figure(
+      "render.mesh_triangles", "torus", static_cast<double>(surface.triangles.size()), "1");
+  const Stopwatch watch;
+  const auto solid = render::MeshDistance::create(surface);
+  if (!solid) return opaline::log::error("{}", solid.error().message);
+  const render::TetMesh mesh = bench::cut(**solid, 1e5);
+  const bench::LitObject object(mesh, team, 0);
+  bench::print_figure("render.mesh_seconds", "torus", watch.seconds(), "s");
+  bench::print_figure("render.mesh_cpu_seconds", "torus", watch.cpu(), "s");
+  bench::print_figure("render.mesh_tets", "torus", static_cast<double>(mesh.tets.size()), "1");
+  bench::print_figure(
+      "render.smallest_dihedral", "uniform", render::quality_of(mesh).smallest_dihedral, "degrees");
+  for (const auto& [name, growth] : {std::pair{"K0.1", 0.1}, std::pair{"K1", 1.0}}) {
+    const auto graded = render::quality_of(bench::cut(*bench::shape("sphere"), 5e5, growth));
+    bench::print_figure("render.smallest_dihedral", name, graded.smallest_dihedral, "degrees");
+    bench::print_figure("render.graded_tets", name, static_cast<double>(graded.tets), "1");
+  }
+}
+
+constexpr double kStep = 2.0;  // degrees a frame
+
+void measure_frame_rate(const render::TetMesh& mesh) {
+  constexpr int kFrames = 61;
+  ThreadTeam team(kThreads);
+  bench::LitObject object(mesh, team, kRemembered);
+  object.frame(0.0, kTolerance, true);
+  std::vector<double> seconds;
+  double worst = 0.0;
+  for (int f = 1; f < kFrames; ++f) {
+    const Stopwatch watch;
+    const auto summary = object.frame(kStep * f, kTolerance, false);
+    seconds.push_back(watch.seconds());
+    worst = std::max(worst, summary.relative_residual);
+  }
+  bench::print_figure("render.diffusion_fps", "140k", 1.0 / bench::median(seconds), "frames/s");
+  bench::print_figure("render.diffusion_residual", "140k", worst, "1");
+}
+
+void print_gain(const char* which, int cold, int iterations, int frames) {
+  const double warm = static_cast<double>(iterations) / frames;
+  bench::print_figure("render.warm_iterations", which, warm, "1");
+  bench::print_figure("render.warm_start_gain", which, cold / std::max(warm, 1.0 / frames), "1");
+}
+
+void measure_warm_starts(const render::TetMesh& mesh) {
+  constexpr int kFrames = 30;
+  ThreadTeam team(1);
+  bench::LitObject object(mesh, team, kRemembered);
+  const int cold = object.frame(0.0, kTolerance, true).iterations;
+  bench::print_figure("render.cold_iterations", "140k", cold, "1");
+  std::vector<double> seconds;
+  int iterations = 0;
+  for (int f = 1; f <= kFrames; ++f) {
+    const Stopwatch watch;
+    iterations += object.frame(kStep * f, kTolerance, false).iterations;
+    seconds.push_back(watch.cpu());
+  }
+  bench::print_figure("render.diffusion_cpu_seconds", "140k", bench::median(seconds), "s");
+  print_gain("light", cold, iterations, kFrames);
+  object.frame(0.0, kTolerance, true);
+  iterations = 0;
+  for (int f = 0; f < kFrames; ++f) {
+    object.paint({7.5 * std::cos(0.1 * f), 7.5 * std::sin(0.1 * f), 1.0}, 1.1);
+    iterations += object.frame(0.0, kTolerance, false).iterations;
+  }
+  print_gain("edit", cold, iterations, kFrames);
+}
+
+void measure_frames() {
+  const render::TetMesh mesh = bench::cut(*bench::shape("torus"), 1.4e5);
+  bench::print_figure("render.diffusion_nodes", "140k", static_cast<double>(mesh.tets.size()), "1");
+  measure_frame_rate(mesh);
+  measure_warm_starts(mesh);
+}
+
+double relative_difference(const std::vector<render::Lanes<float>>& a,
+                           const std::vector<render::Lanes<float>>& b) {
+  double difference = 0.0;
+  double size = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      difference += std::pow(a[i][c] - b[i][c], 2);
+      size += std::pow(b[i][c], 2);
+    }
+  }
+  return std::sqrt(difference / size);
+}
+
+void measure_published() {
+  constexpr int kSweeps = 40;
+  ThreadTeam team(1);
+  const auto solid = bench::shape("torus");
+  std::vector<render::QuadGraph> graphs;
+  for (const double tets :
+       {1.4e5 / 64.0, 1.4e5 / 8.0, 1.4e5}) {  // a quarter of the surface nodes at each
+    graphs.push_back(render::make_quad_graph(bench::cut(*solid, tets)));
+  }
+  const render::QuadGraph* const levels[]{&graphs[0], &graphs[1], &graphs[2]};
+  render::Relaxation relaxation(
+      levels, bench::marbled_optics, bench::render_boundary(), render::GraphWeights::kTwoPoint);
+  const auto q = [](const auto& node) { return bench::light_around(node, 0.0)[0]; };
+  std::vector<double> seconds;
+  for (int round = 0; round < 3; ++round) {
+    const Stopwatch watch;
+    relaxation.solve(q, kSweeps, team);
+    seconds.push_back(watch.cpu());
+  }
+  const double allowed = bench::median(seconds);
+  bench::LitObject object(bench::cut(*solid, 1.4e5), team, 0);
+  object.frame(0.0, 1e-6, true);
+  const auto exact = object.fluence();
+  const double published = relative_difference(relaxation.inner(), exact);
+  double ours = 1.0;
+  double spent = 0.0;
+  for (const double tolerance :
+       {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4}) {  // the best that fits into the time
+    const Stopwatch watch;
+    object.frame(0.0, tolerance, true);
+    const double took = watch.cpu();
+    if (took > allowed) break;
+    spent = took;
+    ours = relative_difference(object.fluence(), exact);
+  }
+  bench::print_figure("render.published_seconds", "140k", allowed, "s");
+  bench::print_figure("render.published_error", "140k", published, "1");
+  bench::print_figure("render.seconds_at_most_published", "140k", spent, "s");
+  bench::print_figure("render.error_at_most_published", "140k", ours, "1");
+  bench::print_figure("render.error_ratio_vs_published", "140k", published / ours, "1");
+}
+
+void measure_growth() {
+  ThreadTeam team(1);
+  std::map<std::string, double> cost;
+  for (const auto& [name, tets] : {std::pair{"100k", 1e5}, std::pair{"1M", 1e6}}) {
+    bench::LitObject object(bench::cut(*bench::shape("torus"), tets), team, 0);
+    std::vector<double> seconds;
+    for (int round = 0; round < 5; ++round) {
+      const Stopwatch watch;
+      object.frame(0.0, kTolerance, true);
+      seconds.push_back(watch.cpu());
+    }
+    cost[name] = 1e9 * bench::median(seconds) / static_cast<double>(object.graph().inner.size());
+    bench::print_figure("render.nanoseconds_per_node", name, cost[name], "ns");
+  }
+  bench::print_figure("render.cost_growth", "100k-1M", cost["1M"] / cost["100k"], "1");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::map<std::string, std::function<void()>> groups{{"sphere", measure_sphere},
+                                                            {"mesh", measure_mesh},
+                                                            {"frames", measure_frames},
+                                                            {"published", measure_published},
+                                                            {"growth", measure_growth}};
+  CLI::App app{
+      "Accuracy and speed of the renderer's numerical ground.\n\nExample: scripts/bench render "
+      "sphere mesh"};
+  std::vector<std::string> chosen;
+  app.add_option("groups", chosen, "sphere, mesh, frames, published, growth; all by default");
+  CLI11_PARSE(app, argc, argv);
+  for (const auto& name : chosen) {
+    if (groups.contains(name)) continue;
+    opaline::log::error("no group \"{}\"; there are sphere, mesh, frames, published, growth", name);
+    return 2;
+  }
+  for (const auto& [name, measure] : groups) {
+    if (chosen.empty() || std::ranges::find(chosen, name) != chosen.end()) measure();
+  }
+  bench::print_figure("render.peak_memory", "all", bench::peak_megabytes(), "MB");
+  return 0;
+}

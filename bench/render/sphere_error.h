@@ -1,0 +1,13 @@
+#pragma once
+
+#include "base/thread_team.h"
+#include "render/tetrahedra/tet_mesh.h"
+
+namespace opaline::bench {
+
+/// Relative RMS error of the surface's fluence on a mesh of a sphere of 10 mm radius lit by q = (1 + cos theta) / 2, plain
+/// optics, against the exact solution (tests/render/graph/lit_sphere.h).
+double graph_error(const render::TetMesh& sphere, ThreadTeam& team);     ///< two-point volumes
+double elements_error(const render::TetMesh& sphere, ThreadTeam& team);  ///< linear finite elements
+
+}  // namespace opaline::bench
