@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
+#include <limits>
 
 #include "reconstruct/illumination_subset.h"
 
@@ -20,6 +22,7 @@ constexpr int kMaxDampings = 10;  // a factor of ten each
 constexpr double kDifference = 1e-2;
 constexpr double kConverged = 1e-3;       // change of the logarithms
 constexpr std::size_t kFew = 4;           // illuminations that two numbers are found from
+constexpr double kUnexplained = 0.25;     // of the data's power
 constexpr double kTwoSided95 = 1.959964;  // of the normal distribution
 
 // sqrt(w) dL/d(log sigma_s', sigma_a), a row a datum.
@@ -94,16 +97,13 @@ class Fit {
 
   Logs bounded(const Logs& logs) const { return logs.cwiseMax(lower_).cwiseMin(upper_); }
 
-  // The best of a table: optical thickness 2 to 60, absorption 0.0003 to 0.1 of scattering.
-  Result<Logs> start() {
-    const auto size = problem_.block.size();
-    const double thickness = std::min({size.x, size.y, size.z});
+  // The best of a table of optical thicknesses, absorption 0.0003 to 0.1 of scattering.
+  Result<Logs> start(std::initializer_list<double> depths) {
     Logs best = Logs::Zero();
     double least = std::numeric_limits<double>::infinity();
-    for (const double depth : {2.0, 6.0, 18.0, 60.0}) {
+    for (const double depth : depths) {
       for (const double ratio : {3e-4, 3e-3, 3e-2, 1e-1}) {
-        const Logs logs =
-            bounded({std::log(depth / thickness), std::log(ratio * depth / thickness)});
+        const Logs logs = of_thickness(depth, ratio);
         const auto r = residuals(logs);
         if (!r) return r.error();
         if (r->squaredNorm() < least) {
@@ -113,6 +113,15 @@ class Fit {
       }
     }
     return best;
+  }
+
+  // The chi^2 of darkness.
+  double power() const {
+    double sum = 0.0;
+    for (const ChannelIllumination& data : problem_.illuminations)
+      for (std::size_t x = 0; x < data.weight.size(); ++x)
+        sum += data.weight[x] * data.radiance[x] * data.radiance[x];
+    return sum;
   }
 
   Result<HomogeneousFit> from(Logs logs) {
@@ -174,6 +183,12 @@ class Fit {
     return slopes;
   }
 
+  Logs of_thickness(double depth, double ratio) const {
+    const auto size = problem_.block.size();
+    const double thickness = std::min({size.x, size.y, size.z});
+    return bounded({std::log(depth / thickness), std::log(ratio * depth / thickness)});
+  }
+
   Result<Eigen::MatrixX2d> jacobian(const Logs& logs, Eigen::Index size) {
     Eigen::MatrixX2d columns(size, 2);
     for (int i = 0; i < 2; ++i) {
@@ -222,6 +237,20 @@ class Fit {
   Logs upper_;
 };
 
+// Through a slab less light comes the more it scatters, through a film more: what no slab explains may be a film.
+Result<HomogeneousFit> sketched(Fit& sketch) {
+  const auto slab = sketch.start({2.0, 6.0, 18.0, 60.0});
+  if (!slab) return slab.error();
+  auto fit = sketch.from(*slab);
+  if (!fit || fit->chi_squared < kUnexplained * sketch.power()) return fit;
+  const auto film = sketch.start({0.02, 0.1, 0.5});
+  if (!film) return film.error();
+  auto thinner = sketch.from(*film);
+  if (!thinner || thinner->chi_squared < fit->chi_squared) return thinner;
+  fit->solves = thinner->solves;  // counted by the sketch
+  return fit;
+}
+
 }  // namespace
 
 Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
@@ -230,9 +259,7 @@ Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
                                        std::stop_token stop) {
   const ChannelProblem few = with_illuminations(problem, few_illuminations(problem, kFew));
   Fit sketch(few, options, solver, stop);
-  const auto start = sketch.start();
-  if (!start) return start.error();
-  auto fit = sketch.from(*start);
+  auto fit = sketched(sketch);
   if (!fit || options.max_iterations > 0) return fit;
   return refine_homogeneous(problem, options, *fit, solver, std::move(stop));
 }

@@ -15,8 +15,6 @@ namespace {
 
 namespace diffusion = reconstruct::diffusion;
 
-constexpr double kIor = 1.3;
-
 Block finer(const Block& b) { return {2 * b.nx, 2 * b.ny, 2 * b.nz, b.hx / 2, b.hy / 2, b.hz / 2}; }
 
 // Share of [a, b] that lies within [lower, upper].
@@ -59,9 +57,10 @@ diffusion::Medium fine_medium(const SyntheticOptions& options,
 void observe(const diffusion::Medium& medium,
              const diffusion::Boundary& boundary,
              std::span<const double> phi,
+             double ior,
              int channel,
              Image<float>& picture) {
-  const double gain = diffusion::camera_equation(kIor, boundary, 1.0).flux_gain;
+  const double gain = diffusion::camera_equation(ior, boundary, 1.0).flux_gain;
   std::vector<double> flux(medium.block.face_cell_count(Face::kZMax));
   diffusion::net_flux(medium, boundary, Face::kZMax, phi, {}, {}, flux);
   for (int j = 0; j < medium.block.ny; ++j) {
@@ -95,6 +94,7 @@ Illumination dark(const Block& block, std::string name, bool held_out, Image<flo
 }  // namespace
 
 Coefficients synthetic_coefficients(const SyntheticOptions& options, Vec3 p, int channel) {
+  if (options.coefficients) return options.coefficients(p, channel);
   const double scattering = 1.0 + 0.3 * channel;
   const double absorption = 0.01 * (1 + channel);
   const Vec3 size = options.block.size();
@@ -112,7 +112,7 @@ Dataset make_synthetic_dataset(const SyntheticOptions& options) {
   const Block& block = options.block;
   Dataset dataset;
   dataset.block = block;
-  dataset.ior = kIor;
+  dataset.ior = options.ior;
   dataset.view_cosine = Image<float>(block.nx, block.ny, 1, 1.0F);
   const Vec3 size = block.size();
   const int n = options.regions;
@@ -133,7 +133,8 @@ Dataset make_synthetic_dataset(const SyntheticOptions& options) {
     const int row = k / (n - 1);
     add("held_out_" + std::to_string(k), true, k % (n - 1) + 0.5, row + 0.5);
   }
-  const auto boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, kIor);
+  const auto boundary =
+      *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, options.ior);
   for (int channel = 0; channel < kColorChannels; ++channel) {
     const diffusion::Medium medium = fine_medium(options, channel, boundary);
     const diffusion::FaceSource light(
@@ -143,14 +144,15 @@ Dataset make_synthetic_dataset(const SyntheticOptions& options) {
     for (std::size_t m = 0; m < fine_light.size(); ++m) {
       std::vector<double> q;
       for (std::size_t f = 0; f < fine_light[m].pixel_count(); ++f) {
-        q.push_back((1.0 - diffusion::normal_reflectance(kIor)) *
+        q.push_back((1.0 - diffusion::normal_reflectance(options.ior)) *
                     fine_light[m].samples()[f * kColorChannels]);
       }
       diffusion::FieldBatch b(fine.cell_count(), 1);
       diffusion::FieldBatch phi(fine.cell_count(), 1);
       light.deposit(q, b.values);
       if (!solver.solve(b, phi, {}, {})) continue;
-      observe(medium, boundary, phi.values, channel, dataset.illuminations[m].radiance);
+      observe(
+          medium, boundary, phi.values, options.ior, channel, dataset.illuminations[m].radiance);
     }
   }
   std::mt19937 random(options.seed);
