@@ -9,8 +9,8 @@ void apply(Quality quality, SessionConfig& s) {
       s.capture.exposures.ratio = 8.0;
       s.capture.exposures.wanted_snr = 25.0;
       s.reduction.grid_step = 2.0;
-      s.reconstruction.tolerance = 1e-4;
-      s.reconstruction.max_iterations = 40;
+      s.reconstruction.tolerance = 1e-3;
+      s.reconstruction.max_iterations = 20;
       s.preview.samples_per_axis = 1;
       s.preview.tolerance = 1e-4;
       return;

@@ -11,8 +11,8 @@ namespace opaline::config {
 ///   capture.regions                        2      4         8
 ///   capture.exposures.ratio, wanted_snr    8, 25  4, 50     2, 100
 ///   reconstruction.grid_step               2      1         1
-///   reconstruction.tolerance               1e-4   1e-5      1e-6
-///   reconstruction.max_iterations          40     150       1000
+///   reconstruction.tolerance               1e-3   1e-5      1e-6
+///   reconstruction.max_iterations          20     150       1000
 ///   reconstruction.discrepancy, stalled    0.1, 0.01        0, 0.002
 ///   preview.samples_per_axis, tolerance    1, 1e-4 2, 1e-6  4, 1e-8
 void apply(Quality quality, SessionConfig& session);

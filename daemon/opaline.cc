@@ -14,6 +14,7 @@
 #include "daemon/cli/daemon_client.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/run.h"
+#include "daemon/cli/tradeoff.h"
 #include "daemon/executor.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/version.h"
@@ -40,6 +41,7 @@ struct Arguments {
   std::filesystem::path sessions = default_sessions();
   std::filesystem::path programs = program_directory();
   bool local = false;
+  TradeoffWish tradeoff;
 };
 
 int report(const Error& error) {
@@ -249,6 +251,26 @@ void declare_deeds(CLI::App& app, Arguments& arguments, int& status_code) {
       "~/sessions/20260131-123456-ab12cd-marble");
 }
 
+void declare_tradeoff(CLI::App& app, Arguments& arguments, int& status_code) {
+  TradeoffWish& wish = arguments.tradeoff;
+  CLI::App* sub = app.add_subcommand(
+      "tradeoff",
+      "Measure seconds against accuracy on a session's own pictures, setting by setting");
+  sub->add_option("DIR", wish.directory, "A session directory, or one with a dataset")->required();
+  sub->add_option(
+      "--out", wish.out, "Directory for tradeoff.csv and tradeoff.svg; default DIR/tradeoff");
+  sub->add_flag("--quick", wish.quick, "Only what takes seconds");
+  sub->add_option("--limit", wish.limit_seconds, "Seconds after which a setting is given up")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->footer(
+      "Ctrl-C stops and keeps what was measured. What the settings mean: "
+      "docs/accuracy.md\n\nExamples:\n"
+      "  opaline tradeoff ~/sessions/20260131-123456-ab12cd-marble\n"
+      "  opaline tradeoff --quick --out /tmp/front ~/sessions/20260131-123456-ab12cd-marble");
+  sub->callback([&] { status_code = report(become_tradeoff(arguments.programs, wish)); });
+}
+
 void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   app.description(
       "Captures translucent materials: one configuration in, a material and its report out.");
@@ -275,6 +297,7 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   declare_run(app, arguments, status_code);
   declare_questions(app, arguments, status_code);
   declare_deeds(app, arguments, status_code);
+  declare_tradeoff(app, arguments, status_code);
 }
 
 int program(int argc, char** argv) {

@@ -103,7 +103,8 @@ class Climb {
                                        events,
                                        context_.clock,
                                        context_.files,
-                                       context_.checkpoints / fmt::format("rung_{}", r + 1)},
+                                       context_.checkpoints / fmt::format("rung_{}", r + 1),
+                                       context_.engine},
                                       std::move(stop));
     if (!result) return result.error();
     report_.rungs.push_back({rung.name, result->seconds, result->held_out});

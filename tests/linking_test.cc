@@ -51,6 +51,7 @@ const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},
     {"opaline-reconstruct", join({kPictures, kVolumes, kProcessor})},
     {"opaline-rig", {}},
+    {"opaline-tradeoff", join({kPictures, kVolumes, kProcessor})},
     {"opaline-transport", {}},
 };
 
@@ -83,12 +84,15 @@ TEST(Linking, EachProgramLinksOnlyItsOwnColumn) {
 }
 
 // The Vulkan loader is opened by name when a context is made, and not linked.
-TEST(Linking, OnlyTheSolverAndThePreviewKnowOfVulkan) {
+TEST(Linking, OnlyTheSolverThePreviewAndTheTradeoffKnowOfVulkan) {
   for (const auto& [name, ignored] : kMayLink) {
     std::ostringstream bytes;
     bytes << std::ifstream(program(name), std::ios::binary).rdbuf();
     const bool is_known = bytes.str().find("libvulkan.so") != std::string::npos;
-    EXPECT_EQ(is_known, name == "opaline-preview" || name == "opaline-reconstruct") << name;
+    EXPECT_EQ(
+        is_known,
+        name == "opaline-preview" || name == "opaline-reconstruct" || name == "opaline-tradeoff")
+        << name;
   }
 }
 

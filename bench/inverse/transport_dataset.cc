@@ -99,6 +99,7 @@ Dataset dataset_from_transport(const TransportResponses& t,
   const int w = t.patches_x / n;  // at least one patch
   const int h = t.patches_y / n;
   const auto add = [&](const char* kind, bool held_out, const Rectangle& lit) {
+    if (lit.x + lit.width > t.patches_x || lit.y + lit.height > t.patches_y) return;
     dataset.illuminations.push_back(
         illumination(t, fmt::format("{}_{}_{}", kind, lit.x, lit.y), held_out, lit));
   };

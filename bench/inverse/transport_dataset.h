@@ -16,7 +16,8 @@ struct TransportDatasetOptions {
   std::uint32_t seed = 1;
 };
 
-/// Regions for the fit; held out: "shifted" by half a region, "larger" (twice a region's side), "smaller" (one patch).
+/// Regions for the fit; held out: "shifted" by half a region, "larger" (twice a region's side), "smaller" (one patch),
+/// as far as they fit the face.
 Dataset dataset_from_transport(const TransportResponses& responses,
                                const TransportDatasetOptions& options);
 

@@ -74,7 +74,7 @@ std::string progress_line(std::string_view stage, const nlohmann::json& progress
   if (!progress.is_object()) return std::string(stage);
   const std::string step = text_of(progress, "step");
   std::string line(stage);
-  if (!step.empty() && step != stage) line += ": " + step;
+  if (!step.empty() && step != stage) line += (line.empty() ? "" : ": ") + step;
   if (const auto it = progress.find("detail"); it != progress.end() && it->is_object()) {
     line += details(*it);
   }

@@ -148,30 +148,61 @@ std::string scale_script(const MapPlot& plot, const Layout& layout) {
       gnuplot_string(plot.scale_label));
 }
 
+std::string_view gnuplot_style(SeriesStyle style) {
+  switch (style) {
+    case SeriesStyle::kLine:
+      return "lines lw 2";
+    case SeriesStyle::kPoints:
+      return "points pt 7 ps 0.6";
+    case SeriesStyle::kLinePoints:
+      return "linespoints lw 2 pt 7 ps 0.5";
+    case SeriesStyle::kSteps:
+      return "steps lw 1.5";
+  }
+  return "lines";
+}
+
+/// The data of series `s`: x, y and the label.
+std::string points_of(const Series& series, std::size_t s) {
+  std::string text = fmt::format("$series{} << EOD\n", s);
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    const std::string_view label = i < series.labels.size() ? series.labels[i] : std::string_view();
+    text += fmt::format(
+        "{} {} \"{}\"\n", gnuplot_number(series.x[i]), gnuplot_number(series.y[i]), label);
+  }
+  return text + "EOD\n";
+}
+
+std::string curve_of(const Series& series, std::size_t s) {
+  std::string text = fmt::format("$series{} using 1:2 with {} lc rgb '{}' title {}",
+                                 s,
+                                 gnuplot_style(series.style),
+                                 series.color,
+                                 gnuplot_string(series.title));
+  if (!series.labels.empty()) {
+    text += fmt::format(
+        ", $series{} using 1:2:3 with labels left rotate by 30 offset 0.4,0.4 font ',8' tc rgb "
+        "'{}' notitle",
+        s,
+        series.color);
+  }
+  return text;
+}
+
 }  // namespace
 
 Result<std::string> draw(const CurvePlot& plot, std::string_view name, std::stop_token stop) {
-  std::string script = preamble(name, 720, 340) + axes(plot.x_label, plot.y_label);
+  std::string script = preamble(name, plot.width, plot.height) + axes(plot.x_label, plot.y_label);
+  if (plot.log_x) script += "set logscale x\nset format x '%g'\n";
   if (plot.log_y) script += "set logscale y\nset format y '%g'\n";
   script += "set key outside right top\n";
-  for (std::size_t s = 0; s < plot.series.size(); ++s) {
-    script += fmt::format("$series{} << EOD\n", s);
-    for (std::size_t i = 0; i < plot.series[s].x.size(); ++i) {
-      script += fmt::format(
-          "{} {}\n", gnuplot_number(plot.series[s].x[i]), gnuplot_number(plot.series[s].y[i]));
-    }
-    script += "EOD\n";
-  }
   std::string curves;
   for (std::size_t s = 0; s < plot.series.size(); ++s) {
-    curves += fmt::format("{}$series{} using 1:2 with lines lw 2 lc rgb '{}' title {}",
-                          s == 0 ? "" : ", ",
-                          s,
-                          plot.series[s].color,
-                          gnuplot_string(plot.series[s].title));
+    script += points_of(plot.series[s], s);
+    curves += (s == 0 ? "" : ", ") + curve_of(plot.series[s], s);
   }
   script += "plot " + curves + level_line(plot.level, plot.level_title) + "\n";
-  return run_gnuplot(script, 720, std::move(stop));
+  return run_gnuplot(script, plot.width, std::move(stop));
 }
 
 Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_token stop) {
@@ -236,6 +267,23 @@ Result<std::string> draw(const ScalePlot& plot, std::string_view name, std::stop
           matrix(ramp),
           (plot.highest - plot.lowest) / kSteps);
   return run_gnuplot(script, 420, std::move(stop));
+}
+
+std::string svg_file(const std::vector<std::string>& drawings, int width, int height) {
+  const int total = height * static_cast<int>(drawings.size());
+  std::string text = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" "
+      "width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\">\n"
+      "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+      width,
+      total);
+  for (std::size_t d = 0; d < drawings.size(); ++d) {
+    text += fmt::format("<svg y=\"{}\" height=\"{}\"{}",
+                        height * static_cast<int>(d),
+                        height,
+                        drawings[d].substr(4));  // after "<svg"
+  }
+  return text + "</svg>\n";
 }
 
 }  // namespace opaline::daemon

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -10,12 +11,17 @@
 
 namespace opaline::daemon {
 
+/// How a curve is drawn.
+enum class SeriesStyle : std::uint8_t { kLine, kPoints, kLinePoints, kSteps };
+
 /// A curve or a row of bars.
 struct Series {
   std::string title;
   std::string color;  ///< "#rrggbb"
   std::vector<double> x;
   std::vector<double> y;
+  SeriesStyle style = SeriesStyle::kLine;  ///< of a curve
+  std::vector<std::string> labels{};       ///< beside the points; none, or one each
 };
 
 /// Curves over one axis.
@@ -26,6 +32,9 @@ struct CurvePlot {
   std::vector<Series> series;
   double level = 0.0;  ///< a dashed line across, when > 0
   std::string level_title;
+  bool log_x = false;
+  int width = 720;  ///< px
+  int height = 340;
 };
 
 /// Groups of bars, one bar a series in each group.
@@ -73,5 +82,8 @@ Result<std::string> draw(const CurvePlot& plot, std::string_view name, std::stop
 Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_token stop);
 Result<std::string> draw(const MapPlot& plot, std::string_view name, std::stop_token stop);
 Result<std::string> draw(const ScalePlot& plot, std::string_view name, std::stop_token stop);
+
+/// An SVG file of drawings of one size, one below the other on white.
+std::string svg_file(const std::vector<std::string>& drawings, int width, int height);
 
 }  // namespace opaline::daemon
