@@ -92,7 +92,7 @@ Result<void> add(gpu::Context& context,
 std::uint64_t partial_count(const Level& finest) {
   const std::size_t half_rows =
       static_cast<std::size_t>((finest.cells[0] + 1) / 2) * finest.cells[1] * finest.cells[2];
-  return 2 * std::max(workgroups(finest.cell_count()), workgroups(half_rows));
+  return std::uint64_t{2} * std::max(workgroups(finest.cell_count()), workgroups(half_rows));
 }
 
 }  // namespace

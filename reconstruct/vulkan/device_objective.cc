@@ -169,7 +169,7 @@ Result<void> DeviceObjective::add_turn(std::size_t first, double light) {
   auto rims = gpu::Buffer::create(context, weights->bytes(), gpu::Memory::kDevice);
   if (!rims) return rims.error();
   const std::size_t left = problem_.illuminations.size() - first;
-  turns_.push_back({static_cast<int>(std::min<std::size_t>(left, groups_ * kLanes)),
+  turns_.push_back({std::min(static_cast<int>(left), groups_ * kLanes),
                     *std::move(irradiance),
                     *std::move(pictures),
                     *std::move(weights),

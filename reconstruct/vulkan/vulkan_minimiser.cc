@@ -1,11 +1,14 @@
 #include "reconstruct/vulkan/vulkan_minimiser.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "reconstruct/fallback_solver.h"
 
 namespace opaline::reconstruct::vulkan {
 namespace {
+
+constexpr double kReachable = 1e-7;  // of a residual, in pairs of float32: device_passes.h
 
 LogBounds bounds_of(const InverseOptions& o) {
   const auto log = [](double v) { return static_cast<float>(std::log(v)); };
@@ -37,12 +40,12 @@ Result<std::unique_ptr<VulkanMinimiser>> VulkanMinimiser::create(gpu::Context& c
                                    made->options_.memory);
   if (!space) return space.error();
   made->space_ = *std::move(space);
-  auto objective =
-      DeviceObjective::create(made->recorder_,
-                              kernels,
-                              model,
-                              problem,
-                              {options.tolerance, options.regularization, options.regularizer});
+  auto objective = DeviceObjective::create(
+      made->recorder_,
+      kernels,
+      model,
+      problem,
+      {std::max(options.tolerance, kReachable), options.regularization, options.regularizer});
   if (!objective) return objective.error();
   made->objective_ = *std::move(objective);
   auto loaded = made->space_->load(from, *made->objective_, made->products_);

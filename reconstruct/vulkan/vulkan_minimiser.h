@@ -8,7 +8,7 @@
 
 namespace opaline::reconstruct::vulkan {
 
-/// L-BFGS on DeviceObjective, all of it on the device. What it is given outlives it.
+/// L-BFGS on DeviceObjective, all of it on the device; solves go no further than 1e-7 of their right-hand sides. What it is given outlives it.
 class VulkanMinimiser final : public Minimiser {
  public:
   static Result<std::unique_ptr<VulkanMinimiser>> create(gpu::Context& context,
