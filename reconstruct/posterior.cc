@@ -1,0 +1,181 @@
+#include "reconstruct/posterior.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/information.h"
+#include "reconstruct/resample.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kLeastAmplitude = 0.02;
+constexpr double kLargestAmplitude = 1.5;
+constexpr int kEvidences = 10;  // of the search: the amplitude to 4 %
+
+VectorXd deviations(const Information& info, const PriorOptions& k, const PriorOptions& a) {
+  VectorXd d(info.size());
+  d << info.diffusion().deviations(k), info.absorption().deviations(a);
+  return d;
+}
+
+// 1 + S A^T A S.
+Eigen::LLT<MatrixXd> whitened(const Information& info, const VectorXd& d) {
+  MatrixXd p = d.asDiagonal() * info.hessian() * d.asDiagonal();
+  p.diagonal().array() += 1.0;
+  return Eigen::LLT<MatrixXd>(p);
+}
+
+double evidence(const Information& info, const PriorOptions& k, const PriorOptions& a) {
+  const VectorXd d = deviations(info, k, a);
+  const auto factors = whitened(info, d);
+  const VectorXd h = d.cwiseProduct(info.gradient());
+  return -0.5 * (info.norm() - h.dot(factors.solve(h))) -
+         factors.matrixLLT().diagonal().array().log().sum();
+}
+
+// Golden section over log amplitude.
+double likeliest_amplitude(const Information& info,
+                           PriorOptions diffusion,
+                           const PriorOptions& absorption) {
+  const auto at = [&](double log_amplitude) {
+    diffusion.amplitude = std::exp(log_amplitude);
+    return evidence(info, diffusion, absorption);
+  };
+  constexpr double kGolden = 0.6180339887498949;
+  double low = std::log(kLeastAmplitude);
+  double high = std::log(kLargestAmplitude);
+  double a = high - kGolden * (high - low);
+  double b = low + kGolden * (high - low);
+  double at_a = at(a);
+  double at_b = at(b);
+  for (int n = 2; n < kEvidences; ++n) {
+    if (at_a > at_b) {
+      high = std::exchange(b, a);
+      at_b = at_a;
+      a = high - kGolden * (high - low);
+      at_a = at(a);
+    } else {
+      low = std::exchange(a, b);
+      at_a = at_b;
+      b = low + kGolden * (high - low);
+      at_b = at(b);
+    }
+  }
+  return std::exp(at_a > at_b ? a : b);
+}
+
+struct Variances {  // per cell of the block
+  std::vector<double> diffusion;
+  std::vector<double> absorption;
+  std::vector<double> both;  // covariance
+};
+
+// diag(F C G^T).
+VectorXd diagonal(const MatrixXd& f, const MatrixXd& c, const MatrixXd& g) {
+  return (f * c).cwiseProduct(g).rowwise().sum();
+}
+
+std::vector<double> less(double prior, std::vector<double> reduction) {
+  for (double& v : reduction) v = std::max(prior - v, 1e-8 * prior);
+  return reduction;
+}
+
+double variance(const PriorOptions& prior) {
+  return prior.level * prior.level + prior.amplitude * prior.amplitude;
+}
+
+Variances variances(const Information& info,
+                    const Block& block,
+                    const MatrixXd& covariance,
+                    const PriorOptions& k,
+                    const PriorOptions& a) {
+  const auto on_block = [&](const VectorXd& v) {
+    return interpolate_cells(info.grid(), block, {v.data(), v.data() + v.size()});
+  };
+  const MatrixXd fk = info.diffusion().values() * info.diffusion().deviations(k).asDiagonal();
+  const MatrixXd fa = info.absorption().values() * info.absorption().deviations(a).asDiagonal();
+  const Index nk = fk.cols();
+  const Index na = fa.cols();
+  const VectorXd less_k =
+      fk.cwiseAbs2().rowwise().sum() - diagonal(fk, covariance.topLeftCorner(nk, nk), fk);
+  const VectorXd less_a =
+      fa.cwiseAbs2().rowwise().sum() - diagonal(fa, covariance.bottomRightCorner(na, na), fa);
+  return {less(variance(k), on_block(less_k)),
+          less(variance(a), on_block(less_a)),
+          on_block(diagonal(fk, covariance.topRightCorner(nk, na), fa))};
+}
+
+// log sigma_s' = log(1 / (3 kappa) - sigma_a): d = -(sigma_t' dlog kappa + sigma_a dlog sigma_a) /
+// sigma_s'.
+ChannelUncertainty uncertainty(const Variances& v, const ChannelCoefficients& c) {
+  ChannelUncertainty out;
+  for (std::size_t i = 0; i < v.diffusion.size(); ++i) {
+    const double by_k = (c.absorption[i] + c.reduced_scattering[i]) / c.reduced_scattering[i];
+    const double by_a = c.absorption[i] / c.reduced_scattering[i];
+    const double scattering = by_k * by_k * v.diffusion[i] + by_a * by_a * v.absorption[i] +
+                              2.0 * by_k * by_a * v.both[i];
+    out.diffusion.push_back(std::sqrt(v.diffusion[i]));
+    out.absorption.push_back(std::sqrt(v.absorption[i]));
+    out.reduced_scattering.push_back(std::sqrt(std::max(scattering, 0.0)));
+  }
+  return out;
+}
+
+Result<void> check_prior(const char* name, const PriorOptions& p) {
+  if (p.level >= 0.0 && p.level < 10.0 && p.amplitude > 0.0 && p.amplitude < 10.0) return ok();
+  return invalid_argument(fmt::format(
+      "posterior {}: level {}, amplitude {}; expected 0 to 10, the amplitude more than 0",
+      name,
+      p.level,
+      p.amplitude));
+}
+
+}  // namespace
+
+Result<void> validate(const PosteriorOptions& o) {
+  if (auto good = check_prior("diffusion", o.diffusion); !good) return good;
+  if (auto good = check_prior("absorption", o.absorption); !good) return good;
+  if (!(o.length_mm > 0.0) || !std::isfinite(o.length_mm))
+    return invalid_argument(fmt::format("posterior: length_mm = {}; expected > 0", o.length_mm));
+  if (!(o.tolerance > 0.0))
+    return invalid_argument(fmt::format("posterior: tolerance = {}; expected > 0", o.tolerance));
+  if (o.cells < 1 || o.diffusion_modes < 1 || o.absorption_modes < 1)
+    return invalid_argument("posterior: cells and modes; expected >= 1");
+  return ok();
+}
+
+Result<ChannelPosterior> posterior(const ChannelProblem& problem,
+                                   diffusion::FluenceSolver& solver,
+                                   const ChannelCoefficients& estimate,
+                                   const PosteriorOptions& options,
+                                   std::stop_token stop) {
+  if (auto valid = validate(options); !valid) return valid.error();
+  Information info(problem, solver, options);
+  if (auto gathered = info.gather(estimate, std::move(stop)); !gathered) return gathered.error();
+  ChannelPosterior out;
+  out.diffusion = options.diffusion;
+  out.absorption = options.absorption;
+  if (options.find_amplitude)
+    out.diffusion.amplitude = likeliest_amplitude(info, out.diffusion, out.absorption);
+  const VectorXd d = deviations(info, out.diffusion, out.absorption);
+  const MatrixXd covariance = whitened(info, d).solve(MatrixXd::Identity(info.size(), info.size()));
+  const Index nk = info.diffusion().size();
+  const Index na = info.absorption().size();
+  out.determined_diffusion = static_cast<double>(nk) - covariance.diagonal().head(nk).sum();
+  out.determined_absorption = static_cast<double>(na) - covariance.diagonal().tail(na).sum();
+  out.deviation = uncertainty(
+      variances(info, problem.block, covariance, out.diffusion, out.absorption), estimate);
+  out.grid = info.grid();
+  out.solves = info.solves();
+  return out;
+}
+
+}  // namespace opaline::reconstruct
