@@ -106,6 +106,41 @@ TEST_F(WholeSession, GoesFromAConfigurationToItsReportThoughTheDaemonIsKilled) {
   EXPECT_EQ(results["fit"].size(), 6U);
 }
 
+/// The tiny session's files with the projector on the camera's side.
+void write_front_lit(const FaultBed& bed) {
+  std::string session = read_text(bed.root() / "session.toml").value();
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    session.replace(session.find(from), from.size(), to);
+  };
+  replace("rig.toml", "rig_front.toml");
+  replace("[capture]", "lit_face = \"z_max\"\n[capture]");
+  const std::string rig =
+      read_text(bed.root() / "rig.toml").value() + "lit_face = \"z_max\"\n";  // of [sim.transport]
+  ASSERT_TRUE(write_whole(system_files(), bed.root() / "front.toml", session));
+  ASSERT_TRUE(write_whole(system_files(), bed.root() / "rig_front.toml", rig));
+}
+
+TEST_F(WholeSession, GoesFromAConfigurationToItsReportLitFromInFront) {
+  write_front_lit(*bed_);
+  const auto run = spawn({"opaline",
+                          "run",
+                          "--local",
+                          "--sessions",
+                          in_bed("sessions").string(),
+                          in_bed("front.toml").string()},
+                         "opaline.out");
+  ASSERT_EQ(run->wait(), 0) << run->output();
+  const auto text = read_text(session() / "results.json");
+  ASSERT_TRUE(text) << text.error().message;
+  const auto results = nlohmann::json::parse(*text, nullptr, false);
+  expect_numbers(results,
+                 {"/fit/0/chi_squared_per_datum", "/reconstruction/direct_light_margin_mm"});
+  // 3 / sigma_t' of marble of 1.5 to 1.7 per mm with veins of half as much: 1.8 to 4 mm.
+  const double margin = results["reconstruction"]["direct_light_margin_mm"];
+  EXPECT_GT(margin, 1.5);
+  EXPECT_LT(margin, 4.0);
+}
+
 TEST_F(WholeSession, LeavesAMaterialThatOtherProgramsRead) {
   const auto session = bed_->new_session();
   ASSERT_TRUE(session) << session.error().message;
