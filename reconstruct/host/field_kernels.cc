@@ -11,6 +11,9 @@ HWY_BEFORE_NAMESPACE();
 namespace opaline::reconstruct::host::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+/// Numbers between what is read and what is asked for: lines follow each other.
+constexpr std::ptrdiff_t kAhead = 256;
+
 using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
@@ -34,10 +37,10 @@ HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M inner) {
   a = hn::NegMulAdd(at(l.diagonal), at(l.x), a);
   a = hn::MulAdd(at(l.gx - 1), at(l.x - 1), a);
   a = hn::MulAdd(at(l.gx), hn::MaskedLoad(inner, d, l.x + i + 1), a);
-  if (l.inner_before != nullptr) a = hn::MulAdd(at(l.gi_before), at(l.inner_before), a);
-  if (l.inner_after != nullptr) a = hn::MulAdd(at(l.gi_after), at(l.inner_after), a);
-  if (l.outer_before != nullptr) a = hn::MulAdd(at(l.go_before), at(l.outer_before), a);
-  if (l.outer_after != nullptr) a = hn::MulAdd(at(l.go_after), at(l.outer_after), a);
+  if (l.y_before != nullptr) a = hn::MulAdd(at(l.gy_before), at(l.y_before), a);
+  if (l.y_after != nullptr) a = hn::MulAdd(at(l.gy_after), at(l.y_after), a);
+  if (l.z_before != nullptr) a = hn::MulAdd(at(l.gz_before), at(l.z_before), a);
+  if (l.z_after != nullptr) a = hn::MulAdd(at(l.gz_after), at(l.z_after), a);
   return a;
 }
 
@@ -45,15 +48,15 @@ double residual_at_first(const FieldLine& l, int nx) {
   if (l.x == nullptr) return l.b[0];
   double a = l.b[0] - l.diagonal[0] * l.x[0];
   if (nx > 1) a += l.gx[0] * l.x[1];
-  if (l.inner_before != nullptr) a += l.gi_before[0] * l.inner_before[0];
-  if (l.inner_after != nullptr) a += l.gi_after[0] * l.inner_after[0];
-  if (l.outer_before != nullptr) a += l.go_before[0] * l.outer_before[0];
-  if (l.outer_after != nullptr) a += l.go_after[0] * l.outer_after[0];
+  if (l.y_before != nullptr) a += l.gy_before[0] * l.y_before[0];
+  if (l.y_after != nullptr) a += l.gy_after[0] * l.y_after[0];
+  if (l.z_before != nullptr) a += l.gz_before[0] * l.z_before[0];
+  if (l.z_after != nullptr) a += l.gz_after[0] * l.z_after[0];
   return a;
 }
 
 template <class T>
-double residual(const FieldLine& line, const double* next, double scale, T* r, int nx) {
+double residual(const FieldLine& line, double scale, T* r, int nx) {
   const FieldLine l = line;  // not to be read again after every store
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
@@ -63,8 +66,8 @@ double residual(const FieldLine& line, const double* next, double scale, T* r, i
   V sum = hn::Zero(d);
   const M all = hn::FirstN(d, static_cast<std::size_t>(step));
   for (int i = 1; i < nx; i += step) {
-    hwy::Prefetch(next + i);
-    if (l.outer_after != nullptr) hwy::Prefetch(l.outer_after + (next - l.b) + i);
+    hwy::Prefetch(l.b + i + kAhead);
+    if (l.z_after != nullptr) hwy::Prefetch(l.z_after + i + kAhead);
     const bool whole = i + step < nx;
     const M cells = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - i));
     const M inner = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - 1 - i));
@@ -76,13 +79,13 @@ double residual(const FieldLine& line, const double* next, double scale, T* r, i
 }
 
 template <class T>
-void add(double* x, const double* next, const T* c, double factor, int nx) {
+void add(double* x, const T* c, double factor, int nx) {
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
   const V f = hn::Set(d, factor);
   int i = 0;
   for (; i + step <= nx; i += step) {
-    hwy::Prefetch(next + i);
+    hwy::Prefetch(x + i + kAhead);
     hn::StoreU(hn::MulAdd(f, load(c + i), hn::LoadU(d, x + i)), d, x + i);
   }
   for (; i < nx; ++i) x[i] += factor * static_cast<double>(c[i]);

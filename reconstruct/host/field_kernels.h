@@ -7,20 +7,20 @@ namespace opaline::reconstruct::host {
 /// Between the caller's fields in float64, one after another, and the passes' lanes, right-hand
 /// sides side by side. T is what the passes compute in: float or double.
 
-/// One line of one field; rows of x outside the grid are null, and x itself where it is zero.
+/// One line of one field along x; rows of x outside the grid are null, and x itself where it is zero.
 struct FieldLine {
   const double* b;
   const double* x;
-  const double* inner_before;
-  const double* inner_after;
-  const double* outer_before;
-  const double* outer_after;
+  const double* y_before;
+  const double* y_after;
+  const double* z_before;
+  const double* z_after;
   const double* diagonal;
   const double* gx;  ///< 0 in the last cell
-  const double* gi_before;
-  const double* gi_after;
-  const double* go_before;
-  const double* go_after;
+  const double* gy_before;
+  const double* gy_after;
+  const double* gz_before;
+  const double* gz_after;
 };
 
 /// Numbers that a line of nx takes in a buffer, where whole registers are written.
@@ -28,11 +28,10 @@ constexpr std::size_t padded(int nx) { return (static_cast<std::size_t>(nx) + 31
 
 template <class T>
 struct FieldKernels {
-  /// r = scale (b - K x) along the line, padded(nx) long; returns the sum of (b - K x)^2. `next` is
-  /// the b that will be asked for.
-  double (*residual)(const FieldLine& line, const double* next, double scale, T* r, int nx);
-  /// x += factor c; `next` is the x that will be asked for.
-  void (*add)(double* x, const double* next, const T* c, double factor, int nx);
+  /// r = scale (b - K x) along the line, padded(nx) long; returns the sum of (b - K x)^2.
+  double (*residual)(const FieldLine& line, double scale, T* r, int nx);
+  /// x += factor c.
+  void (*add)(double* x, const T* c, double factor, int nx);
   /// fields[m stride + i] = d + step[m] p of lane m in cell i; without d that is zero.
   void (*to_fields)(
       const T* d, const T* p, const T* step, T* fields, std::size_t stride, int width, int nx);

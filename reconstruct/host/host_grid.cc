@@ -130,11 +130,9 @@ void round_level(const Level& level, double unit, ThreadTeam& team, HostLevel<T>
 template <class T>
 void build_host_grid(const Medium& medium, ThreadTeam& team, HostGrid<T>& grid) {
   const Block& block = medium.block;
-  const bool exchange = block.ny > block.nz;
-  diffusion::rebuild_levels(exchange ? with_y_and_z_exchanged(medium) : medium, grid.exact);
-  const auto nx = static_cast<std::size_t>(block.nx);
-  grid.inner_stride = exchange ? nx * block.ny : nx;
-  grid.outer_stride = exchange ? nx : nx * block.ny;
+  std::tie(grid.nx, grid.ny, grid.nz) = std::tuple_cat(block.cells());
+  grid.exchanged = block.ny > block.nz;
+  diffusion::rebuild_levels(grid.exchanged ? with_y_and_z_exchanged(medium) : medium, grid.exact);
   const std::vector<double>& diagonal = grid.exact.front().diagonal;
   grid.unit = *std::max_element(diagonal.begin(), diagonal.end());
   grid.levels.resize(grid.exact.size());

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "base/thread_team.h"
@@ -43,11 +44,20 @@ struct HostGrid {
   std::vector<diffusion::Level> exact;  ///< in float64, axes x, inner, outer
   std::vector<HostLevel<T>> levels;     ///< of K / unit
   double unit =
-      1.0;  ///< the largest D of the finest level, so that single precision is in its middle
-  std::size_t inner_stride = 1;  ///< of the caller's fields, in cells
-  std::size_t outer_stride = 1;
+      1.0;     ///< the largest D of the finest level, so that single precision is in its middle
+  int nx = 1;  ///< of the caller's block
+  int ny = 1;
+  int nz = 1;
+  bool exchanged = false;  ///< the inner axis is z
 
-  std::size_t caller_row(int j, int k) const { return j * inner_stride + k * outer_stride; }
+  /// The first cell of line (y, z) in the caller's fields.
+  std::size_t cell(int y, int z) const {
+    return (static_cast<std::size_t>(z) * ny + y) * static_cast<std::size_t>(nx);
+  }
+  /// The same line's inner and outer index.
+  std::pair<int, int> row_of(int y, int z) const {
+    return exchanged ? std::pair{z, y} : std::pair{y, z};
+  }
 };
 
 /// The longer of y and z becomes the outer axis. `medium` must be valid. Whatever `grid` held, its

@@ -1,6 +1,7 @@
 #include "reconstruct/host/host_passes.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 namespace opaline::reconstruct::host {
@@ -222,6 +223,7 @@ template <class T, class S>
 void HostPasses<T, S>::prolong_smooth(int l) {
   for_slabs(work_.parts(l), grid_.levels[l].no, [&](Slab slab) {
     for_waves(l, slab, [&](const Wave& w) { prolong_wave(w); });
+    std::atomic_thread_fence(std::memory_order_seq_cst);  // what was stored past the caches
   });
   if (l > 0) return;
   rho_before_ = rho_;

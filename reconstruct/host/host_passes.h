@@ -119,10 +119,11 @@ class HostPasses {
   void rescale();
   void residual_slab(Slab slab, bool moves);
   void residual_ends(Slab slab);
-  void add_correction(int k, int thread);
-  void residual_plane(int k, int thread);
-  FieldLine field_line(int m, int j, int k) const;
-  const double* next_row(const diffusion::FieldBatch& fields, int m, int j, int k) const;
+  void add_correction(int z, int thread);
+  void residual_plane(int z, int thread);
+  template <class F>
+  void for_rows(int thread, const F& f) const;
+  FieldLine field_line(int m, int y, int z) const;
   std::size_t sums_at(int plane, std::size_t tile) const;
   void clear_sums(int plane, std::size_t tile);
   void total(const std::vector<double>& parts, std::vector<double>& sums) const;

@@ -8,12 +8,12 @@ namespace opaline::reconstruct::host {
 template <class T, class S>
 std::span<const double> HostPasses<T, S>::true_residual() {
   const int parts = work_.parts(0);
-  const int planes = grid_.levels[0].no;
   const bool moves = step_ || correction_;
   if (moves) group_.x_is_zero = false;
-  for_slabs(parts, planes, [&](Slab slab) { residual_slab(slab, moves); });
-  if (moves && std::min(parts, planes) > 1)
-    for_slabs(parts, planes, [&](Slab slab) { residual_ends(slab); });
+  std::fill(work_.norm_sums.begin(), work_.norm_sums.end(), 0.0);
+  for_slabs(parts, grid_.nz, [&](Slab slab) { residual_slab(slab, moves); });
+  if (moves && std::min(parts, grid_.nz) > 1)
+    for_slabs(parts, grid_.nz, [&](Slab slab) { residual_ends(slab); });
   step_ = correction_ = false;
   total(work_.norm_sums, norms_);
   return norms_;
@@ -21,13 +21,13 @@ std::span<const double> HostPasses<T, S>::true_residual() {
 
 template <class T, class S>
 void HostPasses<T, S>::residual_slab(Slab slab, bool moves) {
-  const bool alone = slab.begin == 0 && slab.end == grid_.levels[0].no;
-  const auto waits = [&](int k) {  // for the x of other slabs
-    return moves && !alone && (k == slab.begin || k == slab.end - 1);
+  const bool alone = slab.begin == 0 && slab.end == grid_.nz;
+  const auto waits = [&](int z) {  // for the x of other slabs
+    return moves && !alone && (z == slab.begin || z == slab.end - 1);
   };
-  for (int k = slab.begin; k < slab.end + 1; ++k) {
-    if (moves && k < slab.end) add_correction(k, slab.thread);
-    if (k > slab.begin && !waits(k - 1)) residual_plane(k - 1, slab.thread);
+  for (int z = slab.begin; z < slab.end + 1; ++z) {
+    if (moves && z < slab.end) add_correction(z, slab.thread);
+    if (z > slab.begin && !waits(z - 1)) residual_plane(z - 1, slab.thread);
   }
 }
 
@@ -38,89 +38,88 @@ void HostPasses<T, S>::residual_ends(Slab slab) {
 }
 
 template <class T, class S>
-void HostPasses<T, S>::add_correction(int k, int thread) {
-  const HostLevel<T>& level = grid_.levels[0];
-  const std::size_t line = padded(level.nx);
-  std::vector<T>& fields = work_.fields[thread];
+void HostPasses<T, S>::add_correction(int z, int thread) {
   const std::array<T, 16> none{};
-  for (int j = 0; j < level.ni; ++j)
-    fields_.to_fields(correction_ ? work_.d.row(j, k) : nullptr,
-                      work_.p.row(j, k),
-                      step_ ? step_length_.data() : none.data(),
-                      fields.data() + j * line,
-                      line * level.ni,
-                      width_,
-                      level.nx);
-  for (int m = 0; m < group_.count; ++m) {
-    if (scale_[m] == 0.0) continue;
-    for (int j = 0; j < level.ni; ++j)
-      fields_.add(group_.x.field(group_.first + m) + grid_.caller_row(j, k),
-                  next_row(group_.x, m, j, k),
-                  fields.data() + (static_cast<std::size_t>(m) * level.ni + j) * line,
-                  1.0 / (scale_[m] * grid_.unit),
-                  level.nx);
-  }
+  for_rows(thread, [&](int first, int count, T* fields, std::size_t line) {
+    for (int n = 0; n < count; ++n) {
+      const auto [j, k] = grid_.row_of(first + n, z);
+      fields_.to_fields(correction_ ? work_.d.row(j, k) : nullptr,
+                        work_.p.row(j, k),
+                        step_ ? step_length_.data() : none.data(),
+                        fields + n * line,
+                        line * count,
+                        width_,
+                        grid_.nx);
+    }
+    for (int m = 0; m < group_.count; ++m) {
+      if (scale_[m] == 0.0) continue;
+      double* x = group_.x.field(group_.first + m) + grid_.cell(first, z);
+      for (int n = 0; n < count; ++n)
+        fields_.add(x + static_cast<std::ptrdiff_t>(n) * grid_.nx,
+                    fields + (static_cast<std::size_t>(m) * count + n) * line,
+                    1.0 / (scale_[m] * grid_.unit),
+                    grid_.nx);
+    }
+  });
 }
 
 template <class T, class S>
-void HostPasses<T, S>::residual_plane(int k, int thread) {
-  const HostLevel<T>& level = grid_.levels[0];
-  const std::size_t line = padded(level.nx);
+void HostPasses<T, S>::residual_plane(int z, int thread) {
+  double* sums = &work_.norm_sums[sums_at(z, 0)];
+  for_rows(thread, [&](int first, int count, T* fields, std::size_t line) {
+    for (int m = 0; m < group_.count; ++m)
+      for (int n = 0; n < count; ++n)
+        sums[m] += fields_.residual(field_line(m, first + n, z),
+                                    scale_[m] * growth_[m],
+                                    fields + (static_cast<std::size_t>(m) * count + n) * line,
+                                    grid_.nx);
+    for (int n = 0; n < count; ++n) {
+      const auto [j, k] = grid_.row_of(first + n, z);
+      fields_.to_lanes(fields + n * line, line * count, work_.r[0].row(j, k), width_, grid_.nx);
+    }
+  });
+}
+
+template <class T, class S>
+template <class F>
+void HostPasses<T, S>::for_rows(int thread, const F& f) const {
+  const std::size_t line = padded(grid_.nx);
   std::vector<T>& fields = work_.fields[thread];
-  clear_sums(k, 0);
-  double* sums = &work_.norm_sums[sums_at(k, 0)];
-  for (int m = 0; m < group_.count; ++m)
-    for (int j = 0; j < level.ni; ++j)
-      sums[m] +=
-          fields_.residual(field_line(m, j, k),
-                           next_row(group_.b, m, j, k),
-                           scale_[m] * growth_[m],
-                           fields.data() + (static_cast<std::size_t>(m) * level.ni + j) * line,
-                           level.nx);
-  for (int j = 0; j < level.ni; ++j)
-    fields_.to_lanes(
-        fields.data() + j * line, line * level.ni, work_.r[0].row(j, k), width_, level.nx);
+  const auto most = static_cast<int>(fields.size() / (line * width_));
+  for (int y = 0; y < grid_.ny; y += most) f(y, std::min(most, grid_.ny - y), fields.data(), line);
 }
 
 template <class T, class S>
-const double* HostPasses<T, S>::next_row(const diffusion::FieldBatch& fields,
-                                         int m,
-                                         int j,
-                                         int k) const {
-  const bool here = j + 1 < grid_.levels[0].ni;
-  const int field = here ? m : std::min(m + 1, group_.count - 1);
-  return fields.field(group_.first + field) + grid_.caller_row(here ? j + 1 : 0, k);
-}
-
-template <class T, class S>
-FieldLine HostPasses<T, S>::field_line(int m, int j, int k) const {
-  const double* b = group_.b.field(group_.first + m) + grid_.caller_row(j, k);
+FieldLine HostPasses<T, S>::field_line(int m, int y, int z) const {
+  const double* b = group_.b.field(group_.first + m) + grid_.cell(y, z);
   if (group_.x_is_zero) {
     FieldLine dark{};
     dark.b = b;
     return dark;
   }
   const diffusion::Level& fine = grid_.exact.front();
+  const auto [j, k] = grid_.row_of(y, z);
   const std::size_t at = grid_.levels[0].row(j, k);
-  const auto inner = static_cast<std::ptrdiff_t>(grid_.inner_stride);
-  const auto outer = static_cast<std::ptrdiff_t>(grid_.outer_stride);
-  const double* x = group_.x.field(group_.first + m) + grid_.caller_row(j, k);
+  const int along_y = grid_.exchanged ? 2 : 1;
+  const int along_z = grid_.exchanged ? 1 : 2;
+  const auto plane = static_cast<std::ptrdiff_t>(grid_.nx) * grid_.ny;
+  const double* x = group_.x.field(group_.first + m) + grid_.cell(y, z);
   const auto near = [&](bool there, std::ptrdiff_t offset) { return there ? x + offset : nullptr; };
-  const auto g = [&](int axis, bool there, std::size_t back) {
-    return there ? fine.conductance[axis].data() + at - back : nullptr;
+  const auto before = [&](bool there, int axis) {
+    return there ? fine.conductance[axis].data() + at - fine.stride(axis) : nullptr;
   };
   return {b,
           x,
-          near(j > 0, -inner),
-          near(j + 1 < fine.cells[1], inner),
-          near(k > 0, -outer),
-          near(k + 1 < fine.cells[2], outer),
+          near(y > 0, -grid_.nx),
+          near(y + 1 < grid_.ny, grid_.nx),
+          near(z > 0, -plane),
+          near(z + 1 < grid_.nz, plane),
           fine.diagonal.data() + at,
-          g(0, true, 0),
-          g(1, j > 0, fine.stride(1)),
-          g(1, true, 0),
-          g(2, k > 0, fine.stride(2)),
-          g(2, true, 0)};
+          fine.conductance[0].data() + at,
+          before(y > 0, along_y),
+          fine.conductance[along_y].data() + at,
+          before(z > 0, along_z),
+          fine.conductance[along_z].data() + at};
 }
 
 template class HostPasses<float, float>;

@@ -17,6 +17,7 @@ namespace {
 
 using diffusion::FieldBatch;
 using diffusion::Medium;
+using diffusion::Precision;
 using diffusion::SolveOptions;
 using diffusion::SolveSummary;
 using diffusion::Termination;
@@ -141,18 +142,6 @@ class HostSolver final : public diffusion::FluenceSolver {
 };
 
 }  // namespace
-
-std::string_view to_string(Precision precision) {
-  switch (precision) {
-    case Precision::kHalf:
-      return "half";
-    case Precision::kDouble:
-      return "double";
-    case Precision::kSingle:
-      break;
-  }
-  return "single";
-}
 
 Result<void> validate(const HostOptions& options) {
   if (options.threads < 0 || options.threads > 1024)

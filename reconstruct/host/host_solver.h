@@ -1,25 +1,16 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
-#include <string_view>
 
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/diffusion/precision.h"
 
 namespace opaline::reconstruct::host {
-
-/// How numbers are held between the residuals, which are always in float64.
-enum class Precision : std::uint8_t {
-  kHalf,    ///< the multigrid's corrections in binary16, all else and all arithmetic in single
-  kSingle,  ///< float32
-  kDouble,  ///< float64, twice the memory
-};
-std::string_view to_string(Precision precision);  ///< "half" | "single" | "double"
 
 /// How the processor is used.
 struct HostOptions {
   int threads = 0;  ///< 0: one for every core
-  Precision precision = Precision::kSingle;
+  diffusion::Precision precision = diffusion::Precision::kSingle;
 };
 
 /// "threads = -1; expected 0 (every core) to 1024"

@@ -1,5 +1,7 @@
 #include "reconstruct/host/row_kernels.h"
 
+#include <type_traits>
+
 // Only instruction sets of fixed width: the right-hand sides of a cell are arrays of registers.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
 #undef HWY_TARGET_INCLUDE
@@ -44,6 +46,14 @@ struct Lanes {
   }
   HWY_INLINE void store(T* at) const {
     for (int n = 0; n < kCount; ++n) hn::StoreU(v[n], D(), at + n * kLanes);
+  }
+  /// Past the caches, where that is worth it: nobody asks for it before the next pass.
+  template <class To>
+  HWY_INLINE void stream(To* at) const {
+    if constexpr (W == 16 && std::is_same_v<To, float>)
+      for (int n = 0; n < kCount; ++n) hn::Stream(v[n], D(), at + n * kLanes);
+    else
+      store(at);
   }
   HWY_INLINE void store(Half* at) const {
     auto* to = reinterpret_cast<hwy::float16_t*>(at);
@@ -202,7 +212,7 @@ struct Kernels {
     L odd = L::zero();
     for (std::ptrdiff_t i = 0; i < nx; ++i) {
       const L a = L::load(z + i * W);
-      a.store(out + i * W);
+      a.stream(out + i * W);
       (i % 2 == first ? even : odd).add(a, L::load(r + i * W));
     }
     even.add_to(swept);

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kNumbersPerThread = 16384;  // about 10 us of sweeping: worth waking somebody
 constexpr std::size_t kPlaneBytes = 192 << 10;    // ten such planes stay in 2 MiB
+constexpr std::size_t kFieldNumbers = 64 << 10;   // of a thread, in the cache
 constexpr int kHalo = 4;                          // cells, even: one more than half-sweeps reach
 constexpr int kNarrowest = 64;
 
@@ -79,11 +80,14 @@ Workspace<T, S>::Workspace(const HostGrid<T>& grid, int lanes, int threads)
     *field = HostField<T>(finest.nx, finest.ni, finest.no, lanes);
   for (int thread = 0; thread < parts_.front(); ++thread)
     halo.emplace_back(finest.nx, finest.ni, 2, lanes);
-  fields.assign(parts_.front(), std::vector<T>(padded(finest.nx) * finest.ni * lanes, T{0}));
+  const std::size_t line = padded(finest.nx) * lanes;
+  fields.assign(parts_.front(),
+                std::vector<T>(line * std::max<std::size_t>(1, kFieldNumbers / line), T{0}));
   const std::size_t row = (static_cast<std::size_t>(finest.nx) + 3) * lanes;
   zeros.assign(row, T{0});
   stored_zeros.assign(row, S{});
-  const std::size_t sums = static_cast<std::size_t>(finest.no) * tiles.front().size() * lanes;
+  const std::size_t sums =
+      static_cast<std::size_t>(std::max(finest.ni, finest.no)) * tiles.front().size() * lanes;
   for (auto* each : {&rho_sums, &swept_sums, &norm_sums}) each->assign(sums, 0.0);
 }
 

@@ -81,7 +81,7 @@ struct Workspace {
   std::vector<std::vector<Tile>> tiles;                 ///< [level]
   std::vector<std::vector<Scratch<T>>> scratch;         ///< [level][thread]
   std::vector<HostField<T>> halo;                       ///< [thread]: p beyond the slab, two planes
-  std::vector<std::vector<T>> fields;                   ///< [thread]: a plane, field by field
+  std::vector<std::vector<T>> fields;                   ///< [thread]: some lines, field by field
   std::vector<T> zeros;                                 ///< a row outside the grid
   std::vector<S> stored_zeros;                          ///< the same of z
   std::vector<double> rho_sums, swept_sums, norm_sums;  ///< [plane][tile][width]

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -97,6 +98,137 @@ INSTANTIATE_TEST_SUITE_P(
         Extreme{"Micrometres", uniform({10, 10, 10, 1e-4, 1e-4, 1e-4}, 1e-4, 1.0), 1e-6},
         Extreme{"Metres", uniform({10, 10, 10, 1e3, 1e3, 1e3}, 100.0, 1e-6), 1e-6}),
     [](const auto& extreme) { return std::string(extreme.param.name); });
+
+/// 113 bits of mantissa.
+__extension__ using Quadruple = __float128;
+
+/// K = L L^T of docs/physics.md, "Discretisation on a block sample", dense and in quadruple precision.
+class QuadrupleFactor {
+ public:
+  explicit QuadrupleFactor(const Medium& medium)
+      : n_(medium.block.cell_count()), l_(n_ * n_, Quadruple(0)) {
+    assemble(medium);
+    for (std::size_t c = 0; c < n_; ++c) eliminate(c);
+  }
+
+  std::vector<Quadruple> solve(std::vector<Quadruple> x) const {
+    for (std::size_t r = 0; r < n_; ++r) {
+      for (std::size_t c = 0; c < r; ++c) x[r] -= at(r, c) * x[c];
+      x[r] /= at(r, r);
+    }
+    for (std::size_t r = n_; r-- > 0;) {
+      for (std::size_t c = r + 1; c < n_; ++c) x[r] -= at(c, r) * x[c];
+      x[r] /= at(r, r);
+    }
+    return x;
+  }
+
+  /// ||K^-1||_2, by the power method from below.
+  double inverse_norm() const {
+    std::vector<Quadruple> v(n_, Quadruple(1));
+    double norm = 0.0;
+    for (int iteration = 0; iteration < 60; ++iteration) {
+      double length = 0.0;
+      for (const Quadruple& value : v) length = std::hypot(length, static_cast<double>(value));
+      for (Quadruple& value : v) value /= Quadruple(length);
+      v = solve(v);
+      norm = 0.0;
+      for (const Quadruple& value : v) norm = std::hypot(norm, static_cast<double>(value));
+    }
+    return norm;
+  }
+
+ private:
+  Quadruple& at(std::size_t row, std::size_t column) { return l_[row * n_ + column]; }
+  Quadruple at(std::size_t row, std::size_t column) const { return l_[row * n_ + column]; }
+
+  void assemble(const Medium& medium) {
+    const Block& block = medium.block;
+    const std::array<std::size_t, 3> stride{
+        1, static_cast<std::size_t>(block.nx), static_cast<std::size_t>(block.nx) * block.ny};
+    for (std::size_t c = 0; c < n_; ++c) {
+      const Quadruple own = medium.diffusion[c];
+      at(c, c) += Quadruple(block.hx) * block.hy * block.hz * medium.absorption[c];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto count = static_cast<std::size_t>(block.cells()[axis]);
+        const std::size_t place = c / stride[axis] % count;
+        const Quadruple h = block.spacing()[axis];
+        const Quadruple area = Quadruple(block.hx) * block.hy * block.hz / h;
+        const Quadruple wall = area / (2 * Quadruple(medium.boundary_a) + h / (2 * own));
+        if (place == 0) at(c, c) += wall;
+        if (place + 1 == count) {
+          at(c, c) += wall;
+          continue;
+        }
+        const std::size_t other = c + stride[axis];
+        const Quadruple its = medium.diffusion[other];
+        const Quadruple g = area / h * 2 * own * its / (own + its);
+        at(c, c) += g;
+        at(other, other) += g;
+        at(other, c) -= g;
+      }
+    }
+  }
+
+  void eliminate(std::size_t c) {
+    for (std::size_t k = 0; k < c; ++k) at(c, c) -= at(c, k) * at(c, k);
+    at(c, c) = root(at(c, c));
+    for (std::size_t r = c + 1; r < n_; ++r) {
+      for (std::size_t k = 0; k < c; ++k) at(r, c) -= at(r, k) * at(c, k);
+      at(r, c) /= at(c, c);
+    }
+  }
+
+  static Quadruple root(Quadruple value) {
+    Quadruple x = std::sqrt(static_cast<double>(value));
+    for (int newton = 0; newton < 3; ++newton) x = (x + value / x) / 2;
+    return x;
+  }
+
+  std::size_t n_;
+  std::vector<Quadruple> l_;
+};
+
+Medium hard(double contrast) {
+  Medium medium = random_medium({5, 6, 5, 0.5, 0.5, 0.5}, contrast, 1);
+  medium.diffusion[medium.block.index(2, 3, 2)] = 0.5 / (3.0 * 100.0);  // optical depth 100
+  return medium;
+}
+
+class QuadrupleTruth : public ::testing::TestWithParam<diffusion::Precision> {};
+
+// ||x - K^-1 b|| <= ||K^-1|| ||b - K x||, whatever the solver computes in: the residual in float64 is what counts. Half
+// as much again for the power method, which finds ||K^-1|| from below, and for the rounding of the residual itself.
+TEST_P(QuadrupleTruth, IsAsFarAwayAsTheResidualSaysAtMost) {
+  for (const double contrast : {1.0, 1e3, 1e6}) {
+    const Medium medium = hard(contrast);
+    const QuadrupleFactor factor(medium);
+    FieldBatch b(medium.block.cell_count(), 1);
+    b.values[medium.block.index(2, 2, 0)] = 1.0;
+    FieldBatch phi(b.cells, 1);
+    const auto host = host::make_host_solver({2, GetParam()});
+    ASSERT_TRUE(host->prepare(medium));
+    const auto solved = host->solve(b, phi, {1e-11, 1000}, {});
+    ASSERT_TRUE(solved);
+    ASSERT_EQ(solved->termination, diffusion::Termination::kConverged) << solved->message;
+    const auto exact = factor.solve({b.values.begin(), b.values.end()});
+    double off = 0.0;
+    for (std::size_t c = 0; c < b.cells; ++c)
+      off = std::hypot(off, static_cast<double>(Quadruple(phi.values[c]) - exact[c]));
+    EXPECT_LE(off, 1.5 * factor.inverse_norm() * solved->relative_residual)
+        << "contrast " << contrast;
+    EXPECT_GT(off, 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Host,
+                         QuadrupleTruth,
+                         ::testing::Values(diffusion::Precision::kHalf,
+                                           diffusion::Precision::kSingle,
+                                           diffusion::Precision::kDouble),
+                         [](const auto& precision) {
+                           return std::string(diffusion::to_string(precision.param));
+                         });
 
 class ExtremeIndex : public ::testing::TestWithParam<double> {};
 

@@ -13,6 +13,7 @@ namespace {
 using diffusion::FieldBatch;
 using diffusion::FluenceSolver;
 using diffusion::Medium;
+using diffusion::Precision;
 using diffusion::SolveSummary;
 using diffusion::testing::random_fields;
 using diffusion::testing::random_medium;
