@@ -18,7 +18,7 @@
 #include "render/tetrahedra/stuffing.h"
 
 // render: how accurate and how fast the renderer's numerical ground is, as JSON lines. Groups of figures, all by default:
-//   sphere     error against the exact solution of a lit sphere, graph and finite elements
+//   sphere     error against the exact solution of a lit sphere, graph, finite elements and polygrid
 //   mesh       seconds from a triangle mesh to a graph with its hierarchy; angles
 //   frames     frames a second of the diffusion pass, a light moving 2 degrees a frame; processor seconds of one such frame on
 //              one thread, which a busy machine hardly slows; iterations saved by warm starts, of the light and of a brush
@@ -66,6 +66,10 @@ void measure_sphere() {
     bench::print_figure("render.sphere_tets", name, static_cast<double>(mesh.tets.size()), "1");
     bench::print_figure("render.sphere_rms_graph", name, bench::graph_error(mesh, team), "1");
     bench::print_figure("render.sphere_rms_fem", name, bench::elements_error(mesh, team), "1");
+  }
+  for (const auto& [name, spacing] : {std::pair{"h1.25", 1.25}, std::pair{"h0.8", 0.8}}) {
+    bench::print_figure(
+        "render.sphere_rms_polygrid", name, bench::polygrid_error(*sphere, spacing, team), "1");
   }
 }
 

@@ -5,6 +5,7 @@
 #include "base/ensure.h"
 #include "bench/render/render_case.h"
 #include "render/graph/finite_elements.h"
+#include "render/graph/polygrid.h"
 #include "tests/render/graph/lit_sphere.h"
 
 namespace opaline::bench {
@@ -17,7 +18,7 @@ constexpr double kRadius = 10.0;
 constexpr reconstruct::diffusion::SolveOptions kExact{.tolerance = 1e-8, .max_iterations = 300};
 
 /// Adds up the error of one value after another.
-class Error {
+class SphereError {
  public:
   void add(Vec3 place, double fluence, double area) {
     const double truth = exact_.fluence(place * (kRadius / length(place)));
@@ -38,11 +39,9 @@ std::array<float, 3> light(Vec3 place) {
   return {q, q, q};
 }
 
-}  // namespace
-
-double graph_error(const render::TetMesh& sphere, ThreadTeam& team) {
-  const render::QuadGraph graph = render::make_quad_graph(sphere);
-  render::TwoPoint<double> diffusion(graph, render_boundary());
+template <class Graph>
+double two_point_error(const Graph& graph, ThreadTeam& team) {
+  render::TwoPoint<double, Graph> diffusion(graph, render_boundary());
   ENSURE(diffusion.set_material(std::vector(graph.inner.size(), plain_optics())).has_value());
   std::vector<std::array<float, 3>> q;
   q.reserve(graph.surface.size());
@@ -52,10 +51,23 @@ double graph_error(const render::TetMesh& sphere, ThreadTeam& team) {
   std::vector<Lanes<double>> phi(b.size(), Lanes<double>::zero());
   render::LaneSolver<double>(diffusion.matrix(), {}, team).solve(b, phi, kExact, {});
   const render::SurfaceLight out = diffusion.surface_light(q, phi);
-  Error error;
-  for (std::size_t s = 0; s < q.size(); ++s)
+  SphereError error;
+  for (std::size_t s = 0; s < q.size(); ++s) {
     error.add(graph.surface[s].place, out.fluence[s][0], graph.surface[s].area);
+  }
   return error.relative();
+}
+
+}  // namespace
+
+double graph_error(const render::TetMesh& sphere, ThreadTeam& team) {
+  return two_point_error(render::make_quad_graph(sphere), team);
+}
+
+double polygrid_error(const render::SignedDistance& sphere, double spacing, ThreadTeam& team) {
+  const auto grid = render::make_polygrid(sphere, spacing, {});
+  ENSURE(grid.has_value());
+  return two_point_error(*grid, team);
 }
 
 double elements_error(const render::TetMesh& sphere, ThreadTeam& team) {
@@ -68,7 +80,7 @@ double elements_error(const render::TetMesh& sphere, ThreadTeam& team) {
   std::vector<Lanes<double>> phi(q.size(), Lanes<double>::zero());
   render::LaneSolver<double>(elements->matrix(), {.first_rings = 1}, team)
       .solve(elements->load(q), phi, kExact, {});
-  Error error;
+  SphereError error;
   for (std::size_t v = 0; v < q.size(); ++v) {
     const double area = elements->surface_areas()[v];
     if (area > 0.0) error.add(sphere.vertices[v], phi[v][0], area);

@@ -26,8 +26,9 @@ Lanes<T> coupling(
   return sum;
 }
 
-double reach_back(const QuadGraph& graph, int from, int to) {
-  for (const QuadGraph::Link& link : graph.links[from]) {
+template <class Graph>
+double reach_back(const Graph& graph, int from, int to) {
+  for (const auto& link : graph.links[from]) {
     if (link.inner == to) return link.reach;
   }
   return 0.0;
@@ -35,11 +36,11 @@ double reach_back(const QuadGraph& graph, int from, int to) {
 
 }  // namespace
 
-template <class T>
-TwoPoint<T>::TwoPoint(const QuadGraph& graph, const reconstruct::diffusion::Boundary& boundary)
+template <class T, class Graph>
+TwoPoint<T, Graph>::TwoPoint(const Graph& graph, const reconstruct::diffusion::Boundary& boundary)
     : graph_(graph), boundary_(boundary) {
   for (const auto& links : graph.links) {
-    for (const QuadGraph::Link& link : links) {
+    for (const auto& link : links) {
       if (link.inner >= 0) matrix_.columns.push_back(link.inner);
     }
     matrix_.starts.push_back(static_cast<int>(matrix_.columns.size()));
@@ -49,8 +50,8 @@ TwoPoint<T>::TwoPoint(const QuadGraph& graph, const reconstruct::diffusion::Boun
   conductances_.resize(graph.surface.size(), Lanes<T>::zero());
 }
 
-template <class T>
-Result<void> TwoPoint<T>::set_material(std::span<const Optics> optics) {
+template <class T, class Graph>
+Result<void> TwoPoint<T, Graph>::set_material(std::span<const Optics> optics) {
   if (optics.size() != graph_.inner.size()) {
     return invalid_argument(
         fmt::format("{} places of material for {} nodes", optics.size(), graph_.inner.size()));
@@ -61,12 +62,12 @@ Result<void> TwoPoint<T>::set_material(std::span<const Optics> optics) {
     for (int c = 0; c < 3; ++c)
       sink.set(c, static_cast<T>(graph_.volumes[i] * optics[i].absorption[c]));
     int entry = matrix_.starts[i];
-    for (const QuadGraph::Link& link : graph_.links[i]) {
+    for (const auto& link : graph_.links[i]) {
       if (link.inner >= 0) {
         const double back = reach_back(graph_, link.inner, static_cast<int>(i));
         matrix_.entries[entry++] =
             coupling<T>(link.area, link.reach, optics[i], back, optics[link.inner]) * T{-1};
-      } else {
+      } else if (link.surface >= 0) {
         conductances_[link.surface] = conductance<T>(optics[i], link.reach, 2.0 * boundary_.a);
         sink += conductances_[link.surface] * static_cast<T>(link.area);
       }
@@ -76,8 +77,9 @@ Result<void> TwoPoint<T>::set_material(std::span<const Optics> optics) {
   return ok();
 }
 
-template <class T>
-void TwoPoint<T>::load(std::span<const std::array<float, 3>> q, std::vector<Lanes<T>>& b) const {
+template <class T, class Graph>
+void TwoPoint<T, Graph>::load(std::span<const std::array<float, 3>> q,
+                              std::vector<Lanes<T>>& b) const {
   ENSURE(q.size() == graph_.surface.size());
   b.assign(graph_.inner.size(), Lanes<T>::zero());
   for (std::size_t s = 0; s < q.size(); ++s) {
@@ -88,9 +90,9 @@ void TwoPoint<T>::load(std::span<const std::array<float, 3>> q, std::vector<Lane
   }
 }
 
-template <class T>
-SurfaceLight TwoPoint<T>::surface_light(std::span<const std::array<float, 3>> q,
-                                        const std::vector<Lanes<T>>& phi) const {
+template <class T, class Graph>
+SurfaceLight TwoPoint<T, Graph>::surface_light(std::span<const std::array<float, 3>> q,
+                                               const std::vector<Lanes<T>>& phi) const {
   ENSURE(q.size() == graph_.surface.size() && phi.size() == graph_.inner.size());
   SurfaceLight light{std::vector<std::array<float, 3>>(q.size()),
                      std::vector<std::array<float, 3>>(q.size())};
@@ -107,5 +109,7 @@ SurfaceLight TwoPoint<T>::surface_light(std::span<const std::array<float, 3>> q,
 
 template class TwoPoint<float>;
 template class TwoPoint<double>;
+template class TwoPoint<float, Polygrid>;
+template class TwoPoint<double, Polygrid>;
 
 }  // namespace opaline::render

@@ -4,12 +4,13 @@
 
 #include "reconstruct/diffusion/boundary.h"
 #include "render/graph/optics.h"
+#include "render/graph/polygrid.h"
 #include "render/graph/quad_graph.h"
 #include "render/solver/lane_matrix.h"
 
 namespace opaline::render {
 
-/// Two-point finite volumes on a QuadGraph (Eymard, Gallouet & Herbin, Finite
+/// Two-point finite volumes on a QuadGraph or Polygrid (Eymard, Gallouet & Herbin, Finite
 /// volume methods, 2000, sec. 9; boundary as in docs/physics.md):
 ///
 ///   sum_faces a / (d_i / kappa_i + d_k / kappa_k) (phi_i - phi_k) +
@@ -23,11 +24,11 @@ namespace opaline::render {
 /// lattice's interior.
 ///
 /// Shapes: optics one an inner node; q and the answers one a surface node.
-template <class T>
+template <class T, class Graph = QuadGraph>
 class TwoPoint {
  public:
   /// The graph must outlive it.
-  TwoPoint(const QuadGraph& graph, const reconstruct::diffusion::Boundary& boundary);
+  TwoPoint(const Graph& graph, const reconstruct::diffusion::Boundary& boundary);
 
   /// Takes the material; the matrix keeps its pattern. Errors:
   /// kInvalidArgument, see validate(optics), or shapes differ.
@@ -40,7 +41,7 @@ class TwoPoint {
                              const std::vector<Lanes<T>>& phi) const;
 
  private:
-  const QuadGraph& graph_;
+  const Graph& graph_;
   reconstruct::diffusion::Boundary boundary_;
   LaneMatrix<T> matrix_;
   std::vector<Lanes<T>> conductances_;  // g of each surface node

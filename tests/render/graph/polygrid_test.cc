@@ -1,0 +1,109 @@
+#include "render/graph/polygrid.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/graph/two_point.h"
+#include "render/mesh/shapes.h"
+#include "render/solver/lane_solver.h"
+#include "tests/render/graph/lit_sphere.h"
+
+namespace opaline::render {
+namespace {
+
+using reconstruct::diffusion::BoundaryModel;
+using reconstruct::diffusion::make_boundary;
+using reconstruct::diffusion::Termination;
+using ::testing::HasSubstr;
+
+Polygrid grid_of(std::string_view shape, double spacing) {
+  const auto solid = make_shape(shape, 20.0);
+  auto grid = make_polygrid(**solid, spacing, {});
+  EXPECT_TRUE(grid);
+  return *std::move(grid);
+}
+
+/// Relative RMS error of the surface's fluence on the lit sphere of 10 mm.
+double sphere_error(double spacing) {
+  constexpr double kAbsorption = 0.01;
+  const auto boundary = *make_boundary(BoundaryModel::kTwoMoment, 1.3);
+  Optics optics;
+  optics.absorption.fill(kAbsorption);
+  optics.diffusion.fill(1.0 / (3.0 * (1.0 + kAbsorption)));
+  const Polygrid grid = grid_of("sphere", spacing);
+  TwoPoint<double, Polygrid> diffusion(grid, boundary);
+  EXPECT_TRUE(diffusion.set_material(std::vector(grid.inner.size(), optics)));
+  std::vector<std::array<float, 3>> q(grid.surface.size());
+  for (std::size_t s = 0; s < q.size(); ++s) {
+    q[s].fill(static_cast<float>(LitSphere::irradiance(grid.surface[s].place)));
+  }
+  std::vector<Lanes<double>> b;
+  diffusion.load(q, b);
+  ThreadTeam team(1);
+  std::vector<Lanes<double>> phi(b.size(), Lanes<double>::zero());
+  LaneSolver<double> solver(diffusion.matrix(), {}, team);
+  EXPECT_EQ(solver.solve(b, phi, {.tolerance = 1e-8}, {}).termination, Termination::kConverged);
+  const SurfaceLight light = diffusion.surface_light(q, phi);
+  const LitSphere exact(10.0, optics.diffusion[0], kAbsorption, boundary);
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t s = 0; s < q.size(); ++s) {
+    const double truth = exact.fluence(grid.surface[s].place);
+    error += grid.surface[s].area * std::pow(light.fluence[s][0] - truth, 2);
+    size += grid.surface[s].area * truth * truth;
+  }
+  return std::sqrt(error / size);
+}
+
+// The bounds are the figures of docs/physics.md for a polygrid with the condition along the true normal.
+TEST(Polygrid, ALitSphereConvergesToTheExactSolution) {
+  const double coarse = sphere_error(1.25);
+  const double fine = sphere_error(0.8);
+  EXPECT_LE(coarse, 0.025);
+  EXPECT_LE(fine, 0.016);
+  EXPECT_LT(fine, 0.8 * coarse);
+  EXPECT_LT(sphere_error(0.5), 0.8 * fine);
+}
+
+TEST(Polygrid, BoundaryNodesLieOnTheSurfaceAndCoverIt) {
+  const Polygrid grid = grid_of("torus", 0.3);
+  const auto torus = make_shape("torus", 20.0);
+  double area = 0.0;
+  for (const auto& node : grid.surface) {
+    EXPECT_NEAR((*torus)->at(node.place), 0.0, 1e-3);
+    area += node.area;
+  }
+  EXPECT_NEAR(area / (4.0 * std::numbers::pi * std::numbers::pi * 7.5 * 2.5), 1.0, 0.06);
+  double volume = 0.0;
+  for (const double v : grid.volumes) volume += v;
+  EXPECT_NEAR(volume / (2.0 * std::numbers::pi * std::numbers::pi * 7.5 * 2.5 * 2.5), 1.0, 0.02);
+}
+
+TEST(Polygrid, LinksGoBothWays) {
+  const Polygrid grid = grid_of("figurine", 1.0);
+  for (std::size_t i = 0; i < grid.links.size(); ++i) {
+    for (int k = 0; k < 6; ++k) {
+      const int n = grid.links[i][k].inner;
+      if (n < 0) continue;
+      EXPECT_EQ(grid.links[n][k ^ 1].inner, static_cast<int>(i));
+      EXPECT_NEAR(length(grid.inner[n] - grid.inner[i]), 1.0, 1e-12);
+    }
+  }
+}
+
+TEST(Polygrid, WhatCannotBeDoneIsRefusedWithTheReason) {
+  const auto sphere = make_shape("sphere", 20.0);
+  EXPECT_THAT(make_polygrid(**sphere, 0.0, {}).error().message, HasSubstr("expected > 0"));
+  EXPECT_THAT(make_polygrid(**sphere, 1e-3, {}).error().message, HasSubstr("larger spacing"));
+  const auto ring = make_shape("torus", 0.1);  // a node in its hole, none in it
+  EXPECT_THAT(make_polygrid(**ring, 1.0, {}).error().message, HasSubstr("smaller spacing"));
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(make_polygrid(**sphere, 0.5, stop.get_token()).error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace opaline::render
