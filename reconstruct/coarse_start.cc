@@ -32,6 +32,7 @@ InverseOptions coarse_options(InverseOptions options) {
   options.coarser_grids -= 1;
   options.discrepancy = 1.0;
   options.max_iterations = std::min(options.max_iterations, kMaxIterations);
+  options.stalled = std::max(options.stalled, kStalled);
   return options;
 }
 
@@ -50,23 +51,6 @@ std::deque<CurvaturePair> prolonged_pairs(const Block& coarse,
     if (curvature > 0.0) out.push_back(std::move(finer));
   }
   return out;
-}
-
-/// What was known before, or the homogeneous sample.
-WarmStart without_answer(const std::optional<WarmStart>& from,
-                         const HomogeneousFit& homogeneous,
-                         long solves,
-                         const Block& fine) {
-  if (from) {
-    WarmStart warm = *from;
-    warm.solves += solves;
-    return warm;
-  }
-  const std::size_t cells = fine.cell_count();
-  WarmStart warm{
-      homogeneous, std::vector<double>(cells, std::log(homogeneous.reduced_scattering)), solves};
-  warm.cell_values.resize(2 * cells, std::log(homogeneous.absorption));
-  return warm;
 }
 
 long fine_solves(const Block& coarse, const Block& fine, long solves) {
@@ -101,9 +85,11 @@ Result<WarmStart> coarse_start(const ChannelProblem& problem,
   if (!progress)
     return progress.error().in(fmt::format("{} x {} x {} cells", coarse.nx, coarse.ny, coarse.nz));
   const long solves = fine_solves(coarse, fine, progress->report.solves);
-  const bool moved = progress->report.history.back().iteration > 0;
-  if (!moved || progress->report.stop_reason != StopReason::kDiscrepancy)
-    return without_answer(from, progress->report.homogeneous, solves, fine);
+  if (from && progress->report.history.back().iteration == 0) {
+    WarmStart warm = *from;
+    warm.solves += solves;
+    return warm;
+  }
   WarmStart warm{progress->report.homogeneous,
                  transferred(prolonged, coarse, fine, progress->state.x),
                  solves + (from ? from->solves : 0)};

@@ -10,8 +10,8 @@ namespace opaline::reconstruct {
 /// Where a channel's minimisation starts: the answer on a coarser grid of the same block (reconstruct/coarse_grid.h),
 /// which is found the same way, from still coarser ones while options.coarser_grids allows; the homogeneous fit is on
 /// the coarsest. A coarse grid stops at chi^2 = the number of data, noise and model_error in full: closer, it would
-/// fit its own discretisation. One that is not there after ten iterations cannot see the sample (its cells are some
-/// mean free paths long): its answer is dropped, its homogeneous fit kept. Where `from` is there already, it stays as it is.
+/// fit its own discretisation; or after ten iterations that gain less than a tenth, or thirty in all. Where `from` is
+/// there already, it stays as it is.
 ///
 /// Brought to the finer grid: the logarithms, trilinear, and what L-BFGS learnt of the curvature, s likewise and y spread
 /// over the finer cells, so that s . y stays what it was and the first step is a good one. Solves are counted in fine

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "reconstruct/coarse_grid.h"
@@ -65,17 +64,6 @@ TEST_F(CoarseStart, LeavesAnAnswerAloneThatExplainsThePictures) {
   ASSERT_TRUE(warm) << warm.error().message;
   EXPECT_EQ(warm->cell_values, known.cell_values);
   EXPECT_GT(warm->solves, 7);
-}
-
-// Pictures to a part in a million: the coarse grid's own error is some thousand times that.
-TEST_F(CoarseStart, DropsTheAnswerOfAGridThatCannotSeeTheSample) {
-  const auto warm = start(problem_of(1e-6), std::nullopt);
-  ASSERT_TRUE(warm) << warm.error().message;
-  const auto [low, high] = std::minmax_element(
-      warm->cell_values.begin(),
-      warm->cell_values.begin() + static_cast<std::ptrdiff_t>(kBlock.cell_count()));
-  EXPECT_EQ(*low, *high);
-  EXPECT_NEAR(*low, std::log(warm->homogeneous.reduced_scattering), 1e-12);
 }
 
 TEST_F(CoarseStart, BringsWhatTheCoarseGridFoundToTheFineOne) {
