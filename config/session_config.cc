@@ -22,6 +22,7 @@ constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
+constexpr std::array<std::string_view, 2> kStructureNames{"separate", "shared"};
 constexpr std::array<std::string_view, 4> kModelNames{
     "auto", "homogeneous", "layered", "heterogeneous"};
 constexpr std::array<std::string_view, 3> kMethodNames{"lbfgs", "gauss_newton", "as_published"};
@@ -119,6 +120,9 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.one_of({"model", "of the sample; auto: as much as the held-out lights ask for"},
                 r.model,
                 kModelNames);
+  fields.one_of({"structure", "of the colour channels; shared: one pattern, scaled for each"},
+                r.structure,
+                kStructureNames);
   fields.whole({"coarser_grids", "that the answer is found on first"},
                r.coarser_grids,
                Range::between(0, 10));

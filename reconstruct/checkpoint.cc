@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFormat = 3;
+constexpr int kFormat = 4;
 constexpr std::size_t kLargestFile = std::size_t{4} << 30;
 static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
 
@@ -179,6 +179,19 @@ LadderProgress ladder_from(const json& j) {
   return p;
 }
 
+json to_json(const SharedProgress& p) {
+  json channels = json::array();
+  for (const ChannelReport& report : p.channels) channels.push_back(to_json(report));
+  return {{"state", to_json(p.state)}, {"channels", std::move(channels)}};
+}
+
+SharedProgress shared_from(const json& j) {
+  SharedProgress p{state_from(j.at("state")), {}};
+  for (std::size_t c = 0; c < kColorChannels; ++c)
+    p.channels.at(c) = report_from(j.at("channels").at(c));
+  return p;
+}
+
 json to_json(const Checkpoint& checkpoint) {
   json finished = json::array();
   for (const auto& channel : checkpoint.finished) {
@@ -189,6 +202,7 @@ json to_json(const Checkpoint& checkpoint) {
   }
   json j{{"finished", std::move(finished)}};
   if (checkpoint.current) j["current"] = to_json(*checkpoint.current);
+  if (checkpoint.shared) j["shared"] = to_json(*checkpoint.shared);
   return j;
 }
 
@@ -201,6 +215,7 @@ Checkpoint checkpoint_from(const json& j) {
         report_from(f.at("report"))};
   }
   if (j.contains("current")) checkpoint.current = ladder_from(j.at("current"));
+  if (j.contains("shared")) checkpoint.shared = shared_from(j.at("shared"));
   return checkpoint;
 }
 
@@ -234,6 +249,7 @@ void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
                            static_cast<double>(o.boundary),
                            static_cast<double>(o.method),
                            static_cast<double>(o.model),
+                           static_cast<double>(o.structure),
                            static_cast<double>(o.regularizer),
                            static_cast<double>(o.coarser_grids),
                            static_cast<double>(kFormat)};

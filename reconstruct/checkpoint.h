@@ -27,6 +27,12 @@ struct LadderProgress {
   std::optional<ChannelProgress> current;  ///< of the rung under way
 };
 
+/// The three channels on their way to one structure (reconstruct/shared_structure.h).
+struct SharedProgress {
+  LbfgsState state;
+  std::array<ChannelReport, kColorChannels> channels;
+};
+
 /// All that a reconstruction needs to go on as if it had not stopped.
 struct Checkpoint {
   struct Finished {
@@ -35,6 +41,7 @@ struct Checkpoint {
   };
   std::array<std::optional<Finished>, kColorChannels> finished;
   std::optional<LadderProgress> current;  ///< of the first channel that is not finished
+  std::optional<SharedProgress> shared;   ///< of all channels together; then none is finished
 };
 
 /// SHA-256 over the dataset and every option that the result depends on.

@@ -60,7 +60,14 @@ std::string_view to_string(Smoothness smoothness) {
   return smoothness == Smoothness::kH1 ? "h1" : "tv";
 }
 
+std::string_view to_string(Structure structure) {
+  return structure == Structure::kSeparate ? "separate" : "shared";
+}
+
 Result<void> validate(const InverseOptions& o) {
+  if (o.structure == Structure::kShared && o.method == Method::kAsPublished)
+    return invalid_argument(
+        "structure = shared with method = as_published; expected another method, or separate");
   if (!not_negative(o.direct_light_paths))
     return expected("direct_light_paths", o.direct_light_paths, ">= 0");
   if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");

@@ -42,6 +42,13 @@ enum class Smoothness : std::uint8_t {
 };
 std::string_view to_string(Smoothness smoothness);  ///< "h1" | "tv"
 
+/// Whether the colour channels of a heterogeneous sample have one structure or each its own.
+enum class Structure : std::uint8_t {
+  kSeparate,
+  kShared,  ///< reconstruct/shared_structure.h; by L-BFGS
+};
+std::string_view to_string(Structure structure);  ///< "separate" | "shared"
+
 /// Bounds of a coefficient, 1/mm; 0 < lowest < highest.
 struct CoefficientBounds {
   double lowest = 0.0;
@@ -64,6 +71,7 @@ struct InverseOptions {
   Smoothness regularizer = Smoothness::kH1;
   Method method = Method::kLbfgs;
   Model model = Model::kAuto;  ///< Method::kAsPublished takes kAuto for kHeterogeneous
+  Structure structure = Structure::kSeparate;  ///< not with Method::kAsPublished
   /// That a heterogeneous answer is found on first, each of half the cells an axis (reconstruct/coarse_start.h); >= 0.
   int coarser_grids = 2;
   int max_iterations = 150;  ///< per channel and model; 0 keeps the homogeneous fit

@@ -10,6 +10,7 @@
 #include "reconstruct/model_ladder.h"
 #include "reconstruct/prediction.h"
 #include "reconstruct/relighting_error.h"
+#include "reconstruct/shared_reconstruction.h"
 
 namespace opaline::reconstruct {
 namespace {
@@ -31,6 +32,7 @@ class Reconstruction {
     result_.material.block = dataset_.block;
     result_.material.ior = dataset_.ior;
     result_.predicted = empty_pictures(dataset_);
+    if (auto shared = solve_shared(stop); !shared) return shared.error().in("shared structure");
     for (std::size_t channel = 0; channel < kColorChannels; ++channel) {
       auto done = run_channel(channel, stop);
       if (!done) return done.error().in(fmt::format("{} channel", channel_name(channel)));
@@ -45,6 +47,31 @@ class Reconstruction {
  private:
   double seconds() const {
     return std::chrono::duration<double>(context_.clock.now() - start_).count();
+  }
+
+  // Finishes all channels at once, where one structure is asked for and found; does nothing where they go on each by
+  // itself, as they do when a checkpoint has them doing so.
+  Result<void> solve_shared(std::stop_token stop) {
+    const bool decided = checkpoint_.finished[0].has_value() || checkpoint_.current.has_value();
+    if (!asks_for_shared_structure(options_) || decided) return ok();
+    auto found = reconstruct_shared(
+        dataset_,
+        options_,
+        context_.solver,
+        context_.clock,
+        std::exchange(checkpoint_.shared, std::nullopt),
+        {[this](const ChannelReport& report) { report_progress(0, report, 0, 1); },
+         [this](const SharedProgress& progress) { return save(progress); }},
+        std::move(stop));
+    if (!found) return found.error();
+    if (!*found) return ok();
+    for (std::size_t c = 0; c < kColorChannels; ++c)
+      checkpoint_.finished[c] = std::move((**found)[c]);
+    if (auto saved = save(); !saved) return saved;
+    for (std::size_t c = 0; c < kColorChannels; ++c) {
+      if (auto said = say_reconstructed(c); !said) return said;
+    }
+    return ok();
   }
 
   Result<void> run_channel(std::size_t channel, std::stop_token stop) {
@@ -79,7 +106,13 @@ class Reconstruction {
     if (!models) return models.error();
     auto progress = models->run(std::exchange(checkpoint_.current, std::nullopt), stop);
     if (!progress) return progress.error();
-    const ChannelReport& report = progress->report;
+    checkpoint_.finished[channel] = {to_coefficients(progress->best), std::move(progress->report)};
+    if (auto saved = save(); !saved) return saved;
+    return say_reconstructed(channel);
+  }
+
+  Result<void> say_reconstructed(std::size_t channel) {
+    const ChannelReport& report = checkpoint_.finished[channel]->report;
     log::info("{} channel: {}, {} iterations, chi^2/N {:.2f}, {}, {:.1f} s",
               channel_name(channel),
               report.model,
@@ -87,8 +120,6 @@ class Reconstruction {
               report.history.back().chi_squared_per_datum,
               to_string(report.stop_reason),
               report.seconds);
-    checkpoint_.finished[channel] = {to_coefficients(progress->best), report};
-    if (auto saved = save(); !saved) return saved;
     return context_.events.fact(
         "channel.reconstructed",
         {{"channel", channel_name(channel)},
@@ -97,6 +128,14 @@ class Reconstruction {
          {"chi_squared_per_datum", report.history.back().chi_squared_per_datum},
          {"stop_reason", to_string(report.stop_reason)},
          {"seconds", report.seconds}});
+  }
+
+  Result<void> save(const SharedProgress& progress) {
+    if (context_.checkpoints == nullptr) return ok();
+    checkpoint_.shared = progress;
+    auto saved = context_.checkpoints->save(checkpoint_);
+    checkpoint_.shared.reset();
+    return saved;
   }
 
   Result<void> save(const LadderProgress& progress) {

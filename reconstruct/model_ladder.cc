@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kFew = 4;  // illuminations that a model of few parameters is found from
 constexpr double kStalledBelow = 0.05;  // of a rung that is only a step on the way
-constexpr int kSketch = 10;             // iterations that show whether coarse cells gain anything
+constexpr int kSketch = 6;              // iterations that show whether coarse cells gain anything
 
 Model model_of(const InverseOptions& options) {
   if (options.max_iterations == 0) return Model::kHomogeneous;

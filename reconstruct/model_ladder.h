@@ -27,7 +27,7 @@ namespace opaline::reconstruct {
 ///     the held-out data).
 ///
 /// The held-out error of the rung that is taken is a little too good, being the best of at most four. Two numbers, or two
-/// a layer, need few pictures: those rungs are fitted to four; coarse cells get ten iterations. Whichever rung is the
+/// a layer, need few pictures: those rungs are fitted to four; coarse cells get six iterations. Whichever rung is the
 /// answer is then fitted to the end, to all. A choice other than
 /// Model::kAuto takes its rungs unasked; their held-out errors are found all the same. Where nothing can be held out
 /// (fewer than three illuminations) kAuto is kHeterogeneous.

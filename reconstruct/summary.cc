@@ -22,6 +22,7 @@ Json to_json(const InverseOptions& o) {
           {"boundary", to_string(o.boundary)},
           {"method", to_string(o.method)},
           {"model", to_string(o.model)},
+          {"structure", to_string(o.structure)},
           {"model_error", o.model_error},
           {"direct_light_paths", o.direct_light_paths},
           {"regularization", o.regularization},
