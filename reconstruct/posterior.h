@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <stop_token>
-#include <vector>
 
 #include "base/block.h"
 #include "base/material.h"
 #include "base/result.h"
+#include "base/uncertainty.h"
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/diffusion/fluence_solver.h"
 
@@ -17,14 +17,6 @@ namespace opaline::reconstruct {
 struct PriorOptions {
   double level = 1.5;      ///< standard deviation of the level; >= 0. 1.5: within a factor e^3 = 20
   double amplitude = 0.5;  ///< standard deviation of a cell about the level; > 0
-};
-
-/// Standard deviations of the natural logarithms of one channel's coefficients, one value a cell: 0.1
-/// is about 10 %; 1 is a factor of e up or down.
-struct ChannelUncertainty {
-  std::vector<double> absorption;          ///< of log sigma_a
-  std::vector<double> reduced_scattering;  ///< of log sigma_s'
-  std::vector<double> diffusion;           ///< of log kappa
 };
 
 /// What the posterior assumes, and how finely it is computed.

@@ -20,6 +20,15 @@ constexpr const char* kAbsorption = "absorption";
 constexpr const char* kReducedScattering = "reduced_scattering";
 constexpr const char* kDiffusion = "diffusion";
 
+struct UncertaintyGrid {
+  const char* name;
+  std::vector<double> ChannelUncertainty::*field;
+};
+constexpr std::array<UncertaintyGrid, 3> kUncertaintyGrids{
+    {{"absorption_log_sd", &ChannelUncertainty::absorption},
+     {"reduced_scattering_log_sd", &ChannelUncertainty::reduced_scattering},
+     {"diffusion_log_sd", &ChannelUncertainty::diffusion}}};
+
 using Grid = openvdb::Vec3SGrid;
 
 void initialize_once() {
@@ -37,6 +46,21 @@ Result<void> check_shapes(const Material& material) {
                                           channel.absorption.size(),
                                           channel.reduced_scattering.size(),
                                           cells));
+    }
+  }
+  return ok();
+}
+
+Result<void> check_shapes(const Block& block, const MaterialUncertainty& uncertainty) {
+  for (int c = 0; c < kColorChannels; ++c) {
+    for (const UncertaintyGrid& grid : kUncertaintyGrids) {
+      const std::size_t size = (uncertainty[c].*grid.field).size();
+      if (size == block.cell_count()) continue;
+      return invalid_argument(fmt::format("uncertainty: channel {}, {} has {} values for {} cells",
+                                          kChannelNames[c],
+                                          grid.name,
+                                          size,
+                                          block.cell_count()));
     }
   }
   return ok();
@@ -73,16 +97,23 @@ Grid::Ptr make_grid(const Block& block, const char* name, const char* unit, Valu
   return grid;
 }
 
-openvdb::GridPtrVec make_grids(const Material& material) {
+openvdb::GridPtrVec make_grids(const Material& material, const MaterialUncertainty* uncertainty) {
   const auto& channels = material.channels;
   const auto absorption = [&](int c, std::size_t i) { return channels[c].absorption[i]; };
   const auto scattering = [&](int c, std::size_t i) { return channels[c].reduced_scattering[i]; };
   const auto diffusion = [&](int c, std::size_t i) {
     return 1.0 / (3.0 * (absorption(c, i) + scattering(c, i)));
   };
-  return {make_grid(material.block, kAbsorption, "1/mm", absorption),
-          make_grid(material.block, kReducedScattering, "1/mm", scattering),
-          make_grid(material.block, kDiffusion, "mm", diffusion)};
+  openvdb::GridPtrVec grids{make_grid(material.block, kAbsorption, "1/mm", absorption),
+                            make_grid(material.block, kReducedScattering, "1/mm", scattering),
+                            make_grid(material.block, kDiffusion, "mm", diffusion)};
+  if (uncertainty == nullptr) return grids;
+  for (const UncertaintyGrid& grid : kUncertaintyGrids) {
+    grids.push_back(make_grid(material.block, grid.name, "1", [&](int c, std::size_t i) {
+      return ((*uncertainty)[c].*grid.field)[i];
+    }));
+  }
+  return grids;
 }
 
 openvdb::MetaMap make_metadata(const Material& material, std::string_view generator) {
@@ -156,15 +187,16 @@ Result<Grid::Ptr> find_grid(const openvdb::GridPtrVec& grids,
   return grid;
 }
 
-/// One coefficient of all channels; `field` picks the vector it goes to.
+/// One quantity of all channels; `field` picks the vector it goes to.
+template <class Channel>
 Result<void> read_field(const Contents& contents,
                         const char* name,
-                        std::vector<double> ChannelCoefficients::*field,
-                        Material& material) {
-  const Block& block = material.block;
+                        const Block& block,
+                        std::vector<double> Channel::*field,
+                        std::array<Channel, kColorChannels>& channels) {
   const auto grid = find_grid(contents.grids, name, block);
   if (!grid) return grid.error();
-  for (auto& channel : material.channels) (channel.*field).resize(block.cell_count());
+  for (auto& channel : channels) (channel.*field).resize(block.cell_count());
   const Grid::ConstAccessor accessor = (*grid)->getConstAccessor();
   for (int k = 0; k < block.nz; ++k) {
     for (int j = 0; j < block.ny; ++j) {
@@ -181,7 +213,7 @@ Result<void> read_field(const Contents& contents,
                             k,
                             value[c]));
           }
-          (material.channels[c].*field)[block.index(i, j, k)] = value[c];
+          (channels[c].*field)[block.index(i, j, k)] = value[c];
         }
       }
     }
@@ -208,15 +240,39 @@ Result<Material> to_material(const Contents& contents) {
       metadata_value<openvdb::StringMetadata, std::string>(contents.metadata, "opaline_name");
   if (!name) return name.error();
   Material material{*block, *ior, {}, *name};
-  if (auto r = read_field(contents, kAbsorption, &ChannelCoefficients::absorption, material); !r) {
+  if (auto r = read_field(
+          contents, kAbsorption, *block, &ChannelCoefficients::absorption, material.channels);
+      !r) {
     return r.error();
   }
-  if (auto r = read_field(
-          contents, kReducedScattering, &ChannelCoefficients::reduced_scattering, material);
+  if (auto r = read_field(contents,
+                          kReducedScattering,
+                          *block,
+                          &ChannelCoefficients::reduced_scattering,
+                          material.channels);
       !r) {
     return r.error();
   }
   return material;
+}
+
+/// All of its grids or none.
+Result<std::optional<MaterialUncertainty>> to_uncertainty(const Contents& contents) {
+  const auto is_there = [&](const UncertaintyGrid& wanted) {
+    return std::any_of(contents.grids.begin(), contents.grids.end(), [&](const auto& grid) {
+      return grid->getName() == wanted.name;
+    });
+  };
+  if (std::none_of(kUncertaintyGrids.begin(), kUncertaintyGrids.end(), is_there))
+    return std::optional<MaterialUncertainty>();
+  const auto block = read_block(contents.metadata);
+  if (!block) return block.error();
+  MaterialUncertainty channels;
+  for (const UncertaintyGrid& grid : kUncertaintyGrids) {
+    auto r = read_field(contents, grid.name, *block, grid.field, channels);
+    if (!r) return r.error();
+  }
+  return std::optional(std::move(channels));
 }
 
 bool starts_like_vdb(std::string_view bytes) {
@@ -226,13 +282,18 @@ bool starts_like_vdb(std::string_view bytes) {
 
 }  // namespace
 
-Result<std::string> encode_material(const Material& material, std::string_view generator) {
+Result<std::string> encode_material(const Material& material,
+                                    std::string_view generator,
+                                    const MaterialUncertainty* uncertainty) {
   if (auto shapes = check_shapes(material); !shapes) return shapes.error();
+  if (uncertainty != nullptr) {
+    if (auto shapes = check_shapes(material.block, *uncertainty); !shapes) return shapes.error();
+  }
   try {
     initialize_once();
     std::ostringstream stream(std::ios::binary);
     openvdb::io::Stream archive(stream);
-    archive.write(make_grids(material), make_metadata(material, generator));
+    archive.write(make_grids(material, uncertainty), make_metadata(material, generator));
     return std::move(stream).str();
   } catch (const std::exception& error) {
     return internal_error(fmt::format("OpenVDB: {}", error.what()));
@@ -252,8 +313,9 @@ Result<Material> decode_material(std::string_view bytes) {
 Result<void> write_material(FileOperations& files,
                             const std::filesystem::path& path,
                             const Material& material,
-                            std::string_view generator) {
-  const auto bytes = encode_material(material, generator);
+                            std::string_view generator,
+                            const MaterialUncertainty* uncertainty) {
+  const auto bytes = encode_material(material, generator, uncertainty);
   if (!bytes) return bytes.error().in(path.string());
   return write_whole(files, path, *bytes);
 }
@@ -264,6 +326,21 @@ Result<Material> read_material(const std::filesystem::path& path) {
   auto material = decode_material(*bytes);
   if (!material) return material.error().in(path.string());
   return material;
+}
+
+Result<std::optional<MaterialUncertainty>> read_uncertainty(const std::filesystem::path& path) {
+  const auto bytes = read_text(path, kLargestFile);
+  if (!bytes) return bytes.error();
+  if (!starts_like_vdb(*bytes)) return invalid_argument("not an OpenVDB file").in(path.string());
+  try {
+    initialize_once();
+    auto uncertainty = to_uncertainty(read_stream(*bytes));
+    if (!uncertainty) return uncertainty.error().in(path.string());
+    return uncertainty;
+  } catch (const std::exception& error) {
+    return invalid_argument(
+        fmt::format("{}: truncated or damaged ({})", path.string(), error.what()));
+  }
 }
 
 }  // namespace opaline

@@ -30,6 +30,19 @@ Material make_material() {
   return material;
 }
 
+MaterialUncertainty make_uncertainty(const Block& block) {
+  MaterialUncertainty channels;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    for (std::size_t i = 0; i < block.cell_count(); ++i) {
+      const double value = static_cast<double>(i + 1) / 256.0;
+      channels[c].absorption.push_back(value + static_cast<double>(c));
+      channels[c].reduced_scattering.push_back(value + static_cast<double>(3 + c));
+      channels[c].diffusion.push_back(value + static_cast<double>(6 + c));
+    }
+  }
+  return channels;
+}
+
 std::string output_of(const std::string& command) {
   std::string text;
   FILE* pipe = ::popen(command.c_str(), "r");
@@ -48,6 +61,40 @@ TEST(VolumeIo, ReadsBackWhatItWrote) {
   const auto read = read_material(path);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(*read, make_material());
+}
+
+TEST(VolumeIo, KeepsTheUncertaintyBesideTheCoefficients) {
+  const testing::TemporaryDirectory directory;
+  const auto path = directory.path() / "material.vdb";
+  const Material material = make_material();
+  const MaterialUncertainty uncertainty = make_uncertainty(material.block);
+  ASSERT_TRUE(write_material(system_files(), path, material, "test", &uncertainty));
+  const auto read = read_uncertainty(path);
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_TRUE(read->has_value());
+  EXPECT_EQ(**read, uncertainty);
+  EXPECT_EQ(read_material(path).value(), material);
+  EXPECT_THAT(output_of("vdb_print -l " + path.string() + " 2>&1"),
+              HasSubstr("Name: reduced_scattering_log_sd"));
+}
+
+TEST(VolumeIo, SaysWhenThereIsNoUncertainty) {
+  const testing::TemporaryDirectory directory;
+  const auto path = directory.path() / "material.vdb";
+  ASSERT_TRUE(write_material(system_files(), path, make_material(), "test"));
+  const auto read = read_uncertainty(path);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_FALSE(read->has_value());
+}
+
+TEST(VolumeIo, RefusesAnUncertaintyThatDoesNotFitTheBlock) {
+  const Material material = make_material();
+  MaterialUncertainty uncertainty = make_uncertainty(material.block);
+  uncertainty[1].diffusion.pop_back();
+  const auto encoded = encode_material(material, "test", &uncertainty);
+  ASSERT_FALSE(encoded);
+  EXPECT_THAT(encoded.error().message,
+              HasSubstr("channel green, diffusion_log_sd has 59 values for 60 cells"));
 }
 
 TEST(VolumeIo, IsUnderstoodByOpenVdbsOwnProgram) {
