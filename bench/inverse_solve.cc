@@ -325,7 +325,13 @@ int main(int argc, char** argv) try {
   bool gauss_newton = false;
   app.add_flag("--gauss-newton", gauss_newton, "Gauss-Newton-CG, not L-BFGS");
   app.add_option("--threads", options.threads);
+  std::string precision = "single";
+  app.add_option("--precision", precision, "Of the solver: half, single or double")
+      ->check(CLI::IsMember({"half", "single", "double"}));
   CLI11_PARSE(app, argc, argv);
+  using reconstruct::diffusion::Precision;
+  for (const Precision one : {Precision::kHalf, Precision::kSingle, Precision::kDouble})
+    if (to_string(one) == precision) options.precision = one;
   if (ladder) options.model = reconstruct::Model::kAuto;
   if (gauss_newton) options.method = reconstruct::Method::kGaussNewton;
   if (edges) options.regularizer = reconstruct::Smoothness::kTotalVariation;

@@ -27,6 +27,7 @@ constexpr std::array<std::string_view, 4> kModelNames{
     "auto", "homogeneous", "layered", "heterogeneous"};
 constexpr std::array<std::string_view, 3> kMethodNames{"lbfgs", "gauss_newton", "as_published"};
 constexpr std::array<std::string_view, 2> kSmoothnessNames{"h1", "tv"};
+constexpr std::array<std::string_view, 3> kPrecisionNames{"half", "single", "double"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -144,6 +145,11 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
   fields.flag({"back_end_fallback", "host takes over when the device of vulkan fails"},
               r.back_end_fallback);
   fields.whole({"threads", "0: one a core"}, r.threads, Range::between(0, 1024));
+  fields.one_of({"precision", "of host between float64 residuals"}, r.precision, kPrecisionNames);
+  fields.check(r.precision == reconstruct::diffusion::Precision::kSingle ||
+                   r.back_end != reconstruct::BackEnd::kVulkan,
+               "precision",
+               "expected \"single\", which is what back_end = \"vulkan\" computes in");
   fields.table({"absorption", "Bounds of sigma_a."},
                [&](Fields& f) { visit_bounds(f, r.absorption); });
   fields.table({"reduced_scattering", "Bounds of sigma_s'."},

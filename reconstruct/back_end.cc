@@ -11,8 +11,8 @@ namespace {
 
 using Solver = Result<std::unique_ptr<diffusion::FluenceSolver>>;
 
-Solver make_host(int threads) {
-  const host::HostOptions host{.threads = threads};
+Solver make_host(int threads, diffusion::Precision precision) {
+  const host::HostOptions host{threads, precision};
   if (auto valid = host::validate(host); !valid) return valid.error();
   return host::make_host_solver(host);
 }
@@ -23,7 +23,9 @@ Result<BackEndParts> with(Solver solver) {
 }
 
 Result<BackEndParts> make_vulkan(const InverseOptions& options, const gpu::ContextOptions& gpu) {
-  const auto host = [threads = options.threads] { return make_host(threads); };
+  const auto host = [threads = options.threads, precision = options.precision] {
+    return make_host(threads, precision);
+  };
   auto made = vulkan::make_vulkan_back_end({gpu});
   const bool may_change = options.back_end == BackEnd::kAuto || options.back_end_fallback;
   if (made && may_change)
@@ -43,11 +45,13 @@ Result<BackEndParts> make_back_end(const InverseOptions& options, const gpu::Con
     case BackEnd::kVulkan:
       return make_vulkan(options, gpu);
     case BackEnd::kHost:
-      return with(make_host(options.threads));
+      return with(make_host(options.threads, options.precision));
     case BackEnd::kAuto:
       break;
   }
-  if (!vulkan::real_gpu_available()) return with(make_host(options.threads));
+  const bool single = options.precision == diffusion::Precision::kSingle;
+  if (!single || !vulkan::real_gpu_available())
+    return with(make_host(options.threads, options.precision));
   gpu::ContextOptions real = gpu;
   real.device.allow_software = false;
   return make_vulkan(options, real);

@@ -81,6 +81,11 @@ Result<void> validate(const InverseOptions& o) {
   if (!not_negative(o.stalled)) return expected("stalled", o.stalled, ">= 0");
   if (o.checkpoint_every < 1) return expected("checkpoint_every", o.checkpoint_every, ">= 1");
   if (o.threads < 0) return expected("threads", o.threads, ">= 0");
+  if (o.precision != diffusion::Precision::kSingle && o.back_end == BackEnd::kVulkan)
+    return invalid_argument(
+        fmt::format("precision = \"{}\" with back_end = \"vulkan\", which computes in single; "
+                    "expected back_end = \"host\"",
+                    to_string(o.precision)));
   if (auto valid = validate_bounds("absorption", o.absorption); !valid) return valid;
   return validate_bounds("reduced_scattering", o.reduced_scattering);
 }

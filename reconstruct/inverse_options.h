@@ -5,6 +5,7 @@
 
 #include "base/result.h"
 #include "reconstruct/diffusion/boundary.h"
+#include "reconstruct/diffusion/precision.h"
 #include "reconstruct/diffusion/source.h"
 
 namespace opaline::reconstruct {
@@ -88,6 +89,8 @@ struct InverseOptions {
   /// Whether host takes over when the device of back_end = "vulkan" is missing, full or lost; with "auto" it always does.
   bool back_end_fallback = false;
   int threads = 0;  ///< of the host back end; 0: one a core
+  /// Of the host back end; vulkan has single only, and auto leaves it out where another one is asked for.
+  diffusion::Precision precision = diffusion::Precision::kSingle;
 };
 Result<void> validate(const InverseOptions& options);  ///< "tolerance = 0; expected > 0"
 

@@ -35,7 +35,8 @@ Json to_json(const InverseOptions& o) {
           {"absorption_bounds_per_mm", to_json(o.absorption)},
           {"reduced_scattering_bounds_per_mm", to_json(o.reduced_scattering)},
           {"back_end", to_string(o.back_end)},
-          {"back_end_fallback", o.back_end_fallback}};
+          {"back_end_fallback", o.back_end_fallback},
+          {"precision", to_string(o.precision)}};
 }
 
 Json history_json(const ChannelReport& report) {

@@ -59,6 +59,20 @@ TEST_F(SessionConfigTest, ShowsEveryKeyInTheExamplesAsTheProgramExplainsIt) {
   EXPECT_EQ(read_text(config_file("rig.example.toml")).value(), rig_example());
 }
 
+TEST_F(SessionConfigTest, ReadsThePrecisionAndRefusesOneThatTheDeviceDoesNotHave) {
+  write("rig.toml", "");
+  const auto session = load_session(
+      write("host.toml",
+            "rig = \"rig.toml\"\n[reconstruction]\nprecision = \"half\"\nback_end = \"host\"\n"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->reconstruction.precision, reconstruct::diffusion::Precision::kHalf);
+  const auto problems = problems_of(write(
+      "device.toml",
+      "rig = \"rig.toml\"\n[reconstruction]\nback_end = \"vulkan\"\nprecision = \"double\"\n"));
+  ASSERT_THAT(problems, SizeIs(1));
+  EXPECT_THAT(problems[0], AllOf(StartsWith("4:"), HasSubstr("expected \"single\"")));
+}
+
 TEST_F(SessionConfigTest, TakesTheDefaultsWhereAFileSaysNothing) {
   write("rig.toml", "");
   const auto session = load_session(write("session.toml", "rig = \"rig.toml\"\n"));
