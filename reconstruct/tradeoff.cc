@@ -50,18 +50,6 @@ double cost(const TradeoffSetting& s) {
          (1 + s.options.max_iterations);
 }
 
-std::string_view name_of(host::Precision precision) {
-  switch (precision) {
-    case host::Precision::kHalf:
-      return "half";
-    case host::Precision::kSingle:
-      return "single";
-    case host::Precision::kDouble:
-      return "double";
-  }
-  return "";
-}
-
 std::string quoted(std::string text) {
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -81,7 +69,7 @@ std::string csv_line(const TradeoffPoint& p) {
                                            o.max_iterations,
                                            to_string(o.method),
                                            to_string(o.back_end),
-                                           name_of(p.setting.precision));
+                                           to_string(p.setting.precision));
   if (!p.failed.empty()) return fmt::format("{},,,,,,,{}\n", settings, quoted(p.failed));
   return fmt::format("{},{:.4g},{},{:.5g},{:.5g},{},{},\n",
                      settings,
@@ -108,7 +96,7 @@ std::string describe(const TradeoffSetting& s) {
                                  s.options.tolerance,
                                  to_string(s.options.method),
                                  to_string(s.options.back_end));
-  if (s.options.back_end == BackEnd::kHost) text += fmt::format(", {}", name_of(s.precision));
+  if (s.options.back_end == BackEnd::kHost) text += fmt::format(", {}", to_string(s.precision));
   if (s.dial == "iterations" || s.dial == "optimiser")
     text += fmt::format(", {} iterations", s.options.max_iterations);
   return text;
@@ -128,7 +116,7 @@ TradeoffPlan plan_tradeoff(const Dataset& dataset, bool quick) {
   plan.iterations = {0, 5, 20, kConverge};
   plan.methods = {Method::kLbfgs, Method::kGaussNewton, Method::kAsPublished};
   plan.back_ends = {BackEnd::kVulkan, BackEnd::kReference};
-  plan.precisions = {host::Precision::kHalf, host::Precision::kDouble};
+  plan.precisions = {diffusion::Precision::kHalf, diffusion::Precision::kDouble};
   return plan;
 }
 
@@ -167,7 +155,7 @@ std::vector<TradeoffSetting> settings_of(const TradeoffPlan& plan, const Inverse
   for (const BackEnd back_end : plan.back_ends)
     if (back_end != options.back_end)
       turn("back end", [&](InverseOptions& o) { o.back_end = back_end; });
-  for (const host::Precision precision : plan.precisions) {
+  for (const diffusion::Precision precision : plan.precisions) {
     if (precision == base.precision) continue;
     turn("precision", [](InverseOptions&) {});
     all.back().precision = precision;

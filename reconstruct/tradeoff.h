@@ -19,7 +19,7 @@ struct TradeoffSetting {
       dial;  ///< "given" | "regions and grid" | "tolerance" | "iterations" | "optimiser" | "back end"
   Reduction reduction;
   InverseOptions options;
-  host::Precision precision = host::Precision::kSingle;  ///< of the host back end
+  diffusion::Precision precision = diffusion::Precision::kSingle;  ///< of the host back end
 };
 
 /// "4 x 4 regions, grid 1, 1e-05, lbfgs, host, single"
@@ -34,7 +34,7 @@ struct TradeoffPlan {
   std::vector<int> iterations;  ///< limits; the largest runs on to convergence
   std::vector<Method> methods;
   std::vector<BackEnd> back_ends;
-  std::vector<host::Precision> precisions;
+  std::vector<diffusion::Precision> precisions;
 };
 
 /// For a dataset of n x n regions: n, n/2, ... 1; the whole grid, half, a quarter of it; and all else there is. `quick`

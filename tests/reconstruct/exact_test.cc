@@ -122,10 +122,11 @@ TEST_P(Exact, ADirectSolutionInDoubleIsAsGoodAsItsRounding) {
 TEST_P(Exact, ASolutionToAResidualIsThatGoodInEveryPrecision) {
   for (const double tolerance : {1e-6, GetParam().tightest}) {
     EXPECT_LE(error_of(*diffusion::make_reference_solver(), tolerance), 1e3 * tolerance);
-    for (const auto precision :
-         {host::Precision::kHalf, host::Precision::kSingle, host::Precision::kDouble}) {
+    for (const auto precision : {diffusion::Precision::kHalf,
+                                 diffusion::Precision::kSingle,
+                                 diffusion::Precision::kDouble}) {
       const auto host = host::make_host_solver({.threads = 2, .precision = precision});
-      EXPECT_LE(error_of(*host, tolerance), 1e3 * tolerance) << host::to_string(precision);
+      EXPECT_LE(error_of(*host, tolerance), 1e3 * tolerance) << diffusion::to_string(precision);
     }
   }
 }
