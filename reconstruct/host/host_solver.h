@@ -7,6 +7,8 @@
 
 namespace opaline::reconstruct::host {
 
+using diffusion::Precision;  ///< kHalf, kSingle, kDouble
+
 /// How the processor is used.
 struct HostOptions {
   int threads = 0;  ///< 0: one for every core
