@@ -20,6 +20,7 @@
 #include "bench/forward/forward_case.h"
 #include "bench/inverse/finite_elements.h"
 #include "bench/inverse/material_cases.h"
+#include "bench/inverse/posterior_figures.h"
 #include "bench/inverse/timed_solver.h"
 #include "bench/inverse/transport_dataset.h"
 #include "reconstruct/back_end.h"
@@ -233,10 +234,16 @@ Result<void> compare_with_published(const Case& which,
   return ok();
 }
 
+/// What is done beside the inversion itself.
+struct Extras {
+  bool published = false;
+  bool posterior = false;
+};
+
 Result<void> run(const Case& which,
                  TransportDatasetOptions data,
                  const InverseOptions& options,
-                 bool published) {
+                 const Extras& extras) {
   data.regions = which.regions;
   const Dataset dataset = dataset_from_transport(which.responses, data);
   const auto solver = reconstruct::make_solver(options);
@@ -267,20 +274,26 @@ Result<void> run(const Case& which,
     if (!truth) return truth.error();
     if (auto judged = judge(which, "truth_", measured, margin, *truth, options, **solver); !judged)
       return judged;
+    if (extras.posterior) {
+      auto printed =
+          print_posterior(which.name, measured, *truth, result->material, options, **solver);
+      if (!printed) return printed;
+    }
   }
   if (auto judged = judge(which, "", measured, margin, result->material, options, **solver);
       !judged)
     return judged;
-  return published ? compare_with_published(which, dataset, options, *result, **solver) : ok();
+  return extras.published ? compare_with_published(which, dataset, options, *result, **solver)
+                          : ok();
 }
 
 int run_all(const std::vector<std::string>& names,
             const TransportDatasetOptions& data,
             const InverseOptions& options,
-            bool published) {
+            const Extras& extras) {
   for (const std::string& name : names) {
     const auto which = make_case(name);
-    const auto done = which ? run(*which, data, options, published) : Result<void>(which.error());
+    const auto done = which ? run(*which, data, options, extras) : Result<void>(which.error());
     if (done) continue;
     fmt::print(stderr, "{}: {}\n", name, done.error().message);
     return 1;
@@ -306,8 +319,10 @@ int main(int argc, char** argv) try {
                  "-front (Monte "
                  "Carlo, some minutes the first time); or a transport file")
       ->take_all();
-  bool published = false;
-  app.add_flag("--published", published, "Compare with the paper's minimisation: minutes a case");
+  bench::Extras extras;
+  app.add_flag(
+      "--published", extras.published, "Compare with the paper's minimisation: minutes a case");
+  app.add_flag("--posterior", extras.posterior, "Judge the posterior by the truth");
   app.add_option("--noise", data.noise, "Relative noise added");
   app.add_option("--seed", data.seed, "Of the noise");
   app.add_option("--regularization", options.regularization);
@@ -335,7 +350,7 @@ int main(int argc, char** argv) try {
   if (ladder) options.model = reconstruct::Model::kAuto;
   if (gauss_newton) options.method = reconstruct::Method::kGaussNewton;
   if (edges) options.regularizer = reconstruct::Smoothness::kTotalVariation;
-  return bench::run_all(names, data, options, published);
+  return bench::run_all(names, data, options, extras);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

@@ -1,0 +1,144 @@
+#include "bench/inverse/posterior_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "base/clock.h"
+#include "bench/figure.h"
+#include "reconstruct/channel_problem.h"
+#include "reconstruct/posterior.h"
+
+namespace opaline::bench {
+namespace {
+
+using reconstruct::PriorOptions;
+
+struct Layer {
+  double count = 0.0;
+  double z = 0.0;
+  double z2 = 0.0;
+  double within = 0.0;
+  double variance = 0.0;
+  double prior = 0.0;  // variances
+  double shape = 0.0;
+
+  double z_mean() const { return z / count; }
+  double z_sd() const { return std::sqrt(z2 / count - z_mean() * z_mean()); }
+};
+
+/// Layers from the seen face inwards.
+std::size_t layer_of(const Dataset& d, std::size_t cell) {
+  const Block& b = d.block;
+  const std::array<std::size_t, 3> ijk{
+      cell % b.nx, cell / b.nx % b.ny, cell / (static_cast<std::size_t>(b.nx) * b.ny)};
+  const auto axis = static_cast<std::size_t>(axis_of(d.seen_face));
+  return is_max(d.seen_face) ? b.cells()[axis] - 1 - ijk[axis] : ijk[axis];
+}
+
+void add(const Dataset& dataset,
+         const std::vector<double>& error,
+         const std::vector<double>& deviation,
+         const PriorOptions& prior,
+         std::vector<Layer>& layers) {
+  for (std::size_t i = 0; i < error.size(); ++i) {
+    Layer& layer = layers[layer_of(dataset, i)];
+    const double z = error[i] / deviation[i];
+    layer.count += 1.0;
+    layer.z += z;
+    layer.z2 += z * z;
+    layer.within += std::abs(z) <= 2.0 ? 1.0 : 0.0;
+    layer.variance += deviation[i] * deviation[i];
+    layer.shape += prior.amplitude * prior.amplitude;
+    layer.prior += prior.amplitude * prior.amplitude + prior.level * prior.level;
+  }
+}
+
+double extinction(const ChannelCoefficients& c, std::size_t i) {
+  return c.absorption[i] + c.reduced_scattering[i];
+}
+
+void print(const Dataset& dataset, const std::string& name, const std::vector<Layer>& layers) {
+  const double h = dataset.block.spacing()[static_cast<std::size_t>(axis_of(dataset.seen_face))];
+  Layer all;
+  Layer top;
+  double least = layers.front().z_sd();
+  double most = least;
+  for (std::size_t k = 0; k < layers.size(); ++k) {
+    const Layer& layer = layers[k];
+    const std::string where =
+        fmt::format("{}, {:.2f} mm deep", name, (static_cast<double>(k) + 0.5) * h);
+    print_figure("posterior.z_sd", where, layer.z_sd(), "1");
+    print_figure("posterior.z_mean", where, layer.z_mean(), "1");
+    print_figure("posterior.deviation", where, std::sqrt(layer.variance / layer.count), "1");
+    least = std::min(least, layer.z_sd());
+    most = std::max(most, layer.z_sd());
+    all.count += layer.count;
+    all.within += layer.within;
+    all.z += layer.z;
+    if ((static_cast<double>(k) + 1.0) * h > 2.0 + 1e-9) continue;
+    top.variance += layer.variance;
+    top.prior += layer.prior;
+    top.shape += layer.shape;
+  }
+  print_figure("posterior.z_sd_least", name, least, "1");
+  print_figure("posterior.z_sd_most", name, most, "1");
+  print_figure("posterior.bias", name, all.z_mean(), "1");
+  print_figure("posterior.coverage_2sigma", name, all.within / all.count, "1");
+  if (top.variance == 0.0) return;
+  print_figure("posterior.tightening_top2mm", name, std::sqrt(top.prior / top.variance), "x");
+  print_figure(
+      "posterior.tightening_top2mm_of_shape", name, std::sqrt(top.shape / top.variance), "x");
+}
+
+}  // namespace
+
+Result<void> print_posterior(const std::string& name,
+                             const Dataset& dataset,
+                             const Material& truth,
+                             const Material& found,
+                             const reconstruct::InverseOptions& options,
+                             reconstruct::diffusion::FluenceSolver& solver) {
+  const SystemClock clock;
+  double seconds = 0.0;
+  long solves = 0;
+  const auto layer_count = static_cast<std::size_t>(
+      dataset.block.cells()[static_cast<std::size_t>(axis_of(dataset.seen_face))]);
+  std::vector<Layer> diffusion(layer_count);
+  std::vector<Layer> absorption(layer_count);
+  for (int channel = 0; channel < kColorChannels; ++channel) {
+    const auto c = static_cast<std::size_t>(channel);
+    const ChannelCoefficients& is = found.channels[c];
+    const ChannelCoefficients& was = truth.channels[c];
+    const auto problem =
+        reconstruct::make_channel_problem(dataset, channel, options, reconstruct::Selection::kFit);
+    if (!problem) return problem.error();
+    const auto start = clock.now();
+    const auto known = reconstruct::posterior(*problem, solver, is, {}, {});
+    if (!known) return known.error();
+    seconds += std::chrono::duration<double>(clock.now() - start).count();
+    solves = std::max(solves, known->solves);
+    std::vector<double> by_diffusion;
+    std::vector<double> by_absorption;
+    for (std::size_t i = 0; i < is.absorption.size(); ++i) {
+      by_diffusion.push_back(std::log(extinction(was, i) / extinction(is, i)));
+      by_absorption.push_back(std::log(is.absorption[i] / was.absorption[i]));
+    }
+    add(dataset, by_diffusion, known->deviation.diffusion, known->diffusion, diffusion);
+    add(dataset, by_absorption, known->deviation.absorption, known->absorption, absorption);
+    const std::string where = fmt::format("{}, {}", name, kChannelNames[c]);
+    print_figure("posterior.amplitude_found", where, known->diffusion.amplitude, "1");
+    print_figure("posterior.determined_diffusion", where, known->determined_diffusion, "1");
+    print_figure("posterior.determined_absorption", where, known->determined_absorption, "1");
+  }
+  print(dataset, name + ", log kappa", diffusion);
+  print(dataset, name + ", log sigma_a", absorption);
+  print_figure("posterior.solves", name, static_cast<double>(solves), "1");
+  print_figure("posterior.seconds", name, seconds, "s");
+  return ok();
+}
+
+}  // namespace opaline::bench
