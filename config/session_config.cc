@@ -98,7 +98,8 @@ void visit_reduction(Fields& fields, reconstruct::Reduction& r) {
                Range::between(0, 32));
 }
 
-void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduction& reduction) {
+void visit_reconstruction(Fields& fields, SessionConfig& session) {
+  InverseOptions& r = session.reconstruction;
   fields.one_of({"source", "how light enters"}, r.source, kSourceNames);
   fields.one_of({"deposit", "where a cell's share of the collimated source is put"},
                 r.deposit,
@@ -140,7 +141,8 @@ void visit_reconstruction(Fields& fields, InverseOptions& r, reconstruct::Reduct
                 r.stalled,
                 Range::at_least(0));
   fields.whole({"checkpoint_every", "iterations"}, r.checkpoint_every, Range::between(1, 100000));
-  visit_reduction(fields, reduction);
+  visit_reduction(fields, session.reduction);
+  fields.flag({"uncertainty", "also find how well each cell is known"}, session.uncertainty);
   fields.one_of({"back_end", "what computes"}, r.back_end, kBackEndNames);
   fields.flag({"back_end_fallback", "host takes over when the device of vulkan fails"},
               r.back_end_fallback);
@@ -188,9 +190,8 @@ void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement 
   });
   fields.table({"capture", "How it is captured."},
                [&](Fields& f) { visit_capture(f, session, agreement); });
-  fields.table({"reconstruction", "How the material is found."}, [&](Fields& f) {
-    visit_reconstruction(f, session.reconstruction, session.reduction);
-  });
+  fields.table({"reconstruction", "How the material is found."},
+               [&](Fields& f) { visit_reconstruction(f, session); });
   fields.table({"preview", "How the report's pictures are made."},
                [&](Fields& f) { visit_preview(f, session.preview); });
   fields.check(!(session.target_error > 0.0) || session.capture.patterns.held_out_lights > 0,

@@ -5,10 +5,12 @@
 #include "base/clock.h"
 #include "base/io/dataset_io.h"
 #include "base/io/volume_io.h"
+#include "base/log.h"
 #include "config/session_config.h"
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/version.h"
 #include "reconstruct/back_end.h"
+#include "reconstruct/material_uncertainty.h"
 #include "reconstruct/summary.h"
 #include "reconstruct/target_error.h"
 
@@ -17,6 +19,34 @@ namespace {
 
 using reconstruct::TargetReport;
 using reconstruct::TargetResult;
+using reconstruct::UncertaintyResult;
+
+struct Uncertainty {
+  std::optional<UncertaintyResult> found;
+  std::string absent;  // why there is none
+};
+
+// One that cannot be computed costs nobody the material.
+Result<Uncertainty> find_uncertainty(const config::SessionConfig& config,
+                                     const Dataset& dataset,
+                                     const reconstruct::InverseResult& result,
+                                     const reconstruct::UncertaintyContext& context,
+                                     const std::stop_token& stop) {
+  if (!config.uncertainty) return Uncertainty{{}, "reconstruction.uncertainty = false"};
+  auto found = reconstruct::material_uncertainty(dataset,
+                                                 config.reconstruction,
+                                                 result,
+                                                 {.threads = config.reconstruction.threads},
+                                                 context,
+                                                 stop);
+  if (!found && found.error().code == ErrorCode::kCancelled) return found.error();
+  if (!found) {
+    log::warning("uncertainty: {}", found.error().message);
+    return Uncertainty{{}, "not computed: " + found.error().message};
+  }
+  if (!*found) return Uncertainty{{}, "every channel is homogeneous: two numbers with intervals"};
+  return Uncertainty{*std::move(found), ""};
+}
 
 /// To the accuracy that is asked for, or with the settings as they are.
 Result<TargetResult> find_material(const config::SessionConfig& config,
@@ -49,13 +79,19 @@ nlohmann::ordered_json to_json(const TargetReport& report) {
 
 std::string summary(const config::SessionConfig& config,
                     const Dataset& dataset,
-                    const TargetResult& found) {
+                    const TargetResult& found,
+                    const Uncertainty& uncertainty) {
   auto json = nlohmann::ordered_json::parse(
       reconstruct::summary_json(dataset, config.reconstruction, found.result));
   json["quality"] = config::to_string(config.quality);
   json["grid_step"] = config.reduction.grid_step;
   json["use_regions"] = config.reduction.regions;
   if (config.target_error > 0.0) json["target_error"] = to_json(found.report);
+  if (uncertainty.found) {
+    json["uncertainty"] = reconstruct::to_json(*uncertainty.found);
+  } else {
+    json["uncertainty_absent"] = uncertainty.absent;
+  }
   return json.dump(2) + "\n";
 }
 
@@ -77,13 +113,18 @@ Result<void> reconstruct_session(JobContext& job) {
                               back_end->engine},
                              job.stop);
   if (!found) return found.error();
+  const auto uncertainty = find_uncertainty(
+      *config, *dataset, found->result, {*back_end->solver, job.events, clock}, job.stop);
+  if (!uncertainty) return uncertainty.error().in("uncertainty");
   found->result.material.name = config->sample_name;
   auto written = write_material(job.files,
                                 job.session.material(),
                                 found->result.material,
-                                fmt::format("opaline-reconstruct {}", version()));
+                                fmt::format("opaline-reconstruct {}", version()),
+                                uncertainty->found ? &uncertainty->found->material : nullptr);
   if (!written) return written;
-  return write_whole(job.files, job.session.reconstruction(), summary(*config, *dataset, *found));
+  return write_whole(
+      job.files, job.session.reconstruction(), summary(*config, *dataset, *found, *uncertainty));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "daemon/report/model_section.h"
 #include "daemon/report/report_plots.h"
+#include "daemon/report/uncertainty_section.h"
 
 namespace opaline::daemon {
 namespace {
@@ -54,6 +55,8 @@ std::vector<Order> orders_for(const ReportData& data) {
                              slices_plot(data, coefficient, c)));
     }
   }
+  for (auto& [caption, plot] : uncertainty_plots(data.reconstruction))
+    orders.push_back(order("uncertainty", caption, std::move(plot)));
   return orders;
 }
 

@@ -12,6 +12,7 @@
 #include "daemon/report/model_section.h"
 #include "daemon/report/picture.h"
 #include "daemon/report/report_plots.h"
+#include "daemon/report/uncertainty_section.h"
 
 namespace opaline::daemon {
 namespace {
@@ -120,6 +121,7 @@ void add_header(const ReportData& data, Page& page) {
                                   {"convergence", "Convergence"},
                                   {"accuracy", "Accuracy"},
                                   {"material", "Material"},
+                                  {"uncertainty", "Uncertainty"},
                                   {"assumptions", "Assumptions"},
                                   {"timings", "Timings"},
                                   {"settings", "Settings"}}) {
@@ -254,6 +256,13 @@ void add_material(const ReportData& data, Page& page) {
   page.end();
 }
 
+void add_uncertainty(const ReportData& data, Page& page) {
+  page.begin("uncertainty", "How well the material is known");
+  page.add(uncertainty_section(data.reconstruction));
+  page.add_plots(data, "uncertainty");
+  page.end();
+}
+
 void add_timings(const ReportData& data, Page& page) {
   Rows rows;
   for (const char* stage : {"capture", "reconstruct", "preview"}) {
@@ -292,6 +301,7 @@ Result<std::string> report_page(const ReportData& data) {
   add_convergence(data, page);
   page.add(accuracy_section(data));
   add_material(data, page);
+  add_uncertainty(data, page);
   page.add(html::section("assumptions", "What was assumed", html::facts(assumptions(data))));
   add_timings(data, page);
   add_settings(data, page);

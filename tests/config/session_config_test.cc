@@ -73,6 +73,17 @@ TEST_F(SessionConfigTest, ReadsThePrecisionAndRefusesOneThatTheDeviceDoesNotHave
   EXPECT_THAT(problems[0], AllOf(StartsWith("4:"), HasSubstr("expected \"single\"")));
 }
 
+TEST_F(SessionConfigTest, ReadsWhetherTheUncertaintyIsWanted) {
+  write("rig.toml", "");
+  const auto session = load_session(
+      write("session.toml", "rig = \"rig.toml\"\n[reconstruction]\nuncertainty = false\n"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_FALSE(session->uncertainty);
+  const auto again = parse_resolved({"resolved.toml", to_toml(*session), {}});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_FALSE(again->uncertainty);
+}
+
 TEST_F(SessionConfigTest, TakesTheDefaultsWhereAFileSaysNothing) {
   write("rig.toml", "");
   const auto session = load_session(write("session.toml", "rig = \"rig.toml\"\n"));

@@ -197,7 +197,26 @@ class Fabricator {
            {"stop_reason", "discrepancy"},
            {"stop_explanation", "the pictures are explained to within their noise"}});
     }
-    return nlohmann::json{{"format", 1}, {"channels", channels}}.dump();
+    return nlohmann::json{{"format", 1}, {"channels", channels}, {"uncertainty", uncertainty()}}
+        .dump();
+  }
+
+  static nlohmann::json uncertainty() {
+    nlohmann::json channels = nlohmann::json::array();
+    for (const char* name : kChannelNames) {
+      channels.push_back(
+          {{"channel", name},
+           {"determined_diffusion", 40.25},
+           {"determined_absorption", 12.5},
+           {"seconds", 2.5},
+           {"reduced_scattering",
+            {{"prior", 1.5},
+             {"amplitude", 0.25},
+             {"layers", {0.03, 0.06, 0.12, 0.24, 0.25, 0.26}}}},
+           {"absorption",
+            {{"prior", 1.625}, {"amplitude", 0.5}, {"layers", {0.3, 0.4, 0.44, 0.46, 0.5, 0.5}}}}});
+    }
+    return {{"layer_mm", 1.0}, {"channels", channels}};
   }
 
   Result<void> log(const SessionDirectory& session) {

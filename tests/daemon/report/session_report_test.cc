@@ -252,6 +252,18 @@ TEST_F(SessionReportTest, ShowsWhichModelsWereTriedAndWhyItStopped) {
   EXPECT_THAT(shown, HasSubstr("0.02 (0.015 to 0.025)"));
 }
 
+TEST_F(SessionReportTest, ShowsHowWellEachDepthIsKnown) {
+  report();
+  const std::string shown = section("uncertainty");
+  EXPECT_EQ(count(shown, "<svg"), 2U);
+  EXPECT_THAT(shown, HasSubstr("depth below the seen face, mm"));
+  for (const char* channel : {"red", "green", "blue"}) {
+    EXPECT_THAT(shown,
+                HasSubstr(fmt::format(
+                    "<td>{}: {}</td><td>1.50</td><td>0.03</td>", channel, html::escaped("σs'"))));
+  }
+}
+
 TEST_F(SessionReportTest, CutsEachCoefficientOfEachChannel) {
   report();
   const std::string shown = section("material");
