@@ -41,7 +41,7 @@ struct SessionConfig {
   capture::CaptureOptions capture;
   reconstruct::InverseOptions reconstruction;
   reconstruct::Reduction reduction;  ///< in [reconstruction], too
-  bool uncertainty = true;           ///< in [reconstruction]: whether the material's is found, too
+  bool uncertainty = false;          ///< in [reconstruction]: whether the material's is found, too
   PreviewOptions preview;
 };
 

@@ -76,12 +76,12 @@ TEST_F(SessionConfigTest, ReadsThePrecisionAndRefusesOneThatTheDeviceDoesNotHave
 TEST_F(SessionConfigTest, ReadsWhetherTheUncertaintyIsWanted) {
   write("rig.toml", "");
   const auto session = load_session(
-      write("session.toml", "rig = \"rig.toml\"\n[reconstruction]\nuncertainty = false\n"));
+      write("session.toml", "rig = \"rig.toml\"\n[reconstruction]\nuncertainty = true\n"));
   ASSERT_TRUE(session) << session.error().message;
-  EXPECT_FALSE(session->uncertainty);
+  EXPECT_TRUE(session->uncertainty);
   const auto again = parse_resolved({"resolved.toml", to_toml(*session), {}});
   ASSERT_TRUE(again) << again.error().message;
-  EXPECT_FALSE(again->uncertainty);
+  EXPECT_TRUE(again->uncertainty);
 }
 
 TEST_F(SessionConfigTest, TakesTheDefaultsWhereAFileSaysNothing) {
