@@ -31,7 +31,6 @@ namespace {
 namespace bench = opaline::bench;
 namespace render = opaline::render;
 using opaline::ThreadTeam;
-using opaline::Vec3;
 
 constexpr double kTolerance = 1e-3;
 constexpr int kThreads = 2;
@@ -226,7 +225,7 @@ void measure_growth() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   const std::map<std::string, std::function<void()>> groups{{"sphere", measure_sphere},
                                                             {"mesh", measure_mesh},
                                                             {"frames", measure_frames},
@@ -248,4 +247,7 @@ int main(int argc, char** argv) {
   }
   bench::print_figure("render.peak_memory", "all", bench::peak_megabytes(), "MB");
   return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
 }

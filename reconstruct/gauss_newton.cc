@@ -114,7 +114,8 @@ Result<StepOutcome> gauss_newton_step(LbfgsState& state,
     CurvaturePair last{x, at->gradient};
     add(last.s, -1.0, state.x);
     add(last.y, -1.0, state.at.gradient);
-    state.pairs.assign(1, std::move(last));
+    state.pairs.clear();
+    state.pairs.push_back(std::move(last));
     state.x = std::move(x);
     state.at = *std::move(at);
     return StepOutcome::kMoved;

@@ -43,7 +43,7 @@ ChannelProblem with_illuminations(const ChannelProblem& problem,
 }
 
 std::vector<std::size_t> few_illuminations(const ChannelProblem& problem, std::size_t count) {
-  const std::vector<std::size_t> usable = with_data(problem);
+  std::vector<std::size_t> usable = with_data(problem);
   if (usable.size() <= count) return usable;
   std::vector<std::size_t> few;
   for (std::size_t n = 0; n < count; ++n)

@@ -50,7 +50,7 @@ double cost(const TradeoffSetting& s) {
          (1 + s.options.max_iterations);
 }
 
-std::string quoted(std::string text) {
+std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + '"';

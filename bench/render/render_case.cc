@@ -91,7 +91,7 @@ SolveSummary LitObject::frame(double degrees, double tolerance, bool cold) {
     std::ranges::fill(phi_, Lanes<float>::zero());
   }
   diffusion_.load(q_, b_);
-  const SolveSummary summary =
+  SolveSummary summary =
       solver_->solve(b_, phi_, {.tolerance = tolerance, .max_iterations = 200}, {});
   static_cast<void>(diffusion_.surface_light(q_, phi_));
   return summary;

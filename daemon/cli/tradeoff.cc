@@ -16,6 +16,7 @@ Error become_tradeoff(const std::filesystem::path& programs, const TradeoffWish&
   if (wish.quick) words.emplace_back("--quick");
   words.insert(words.end(), {"--", wish.directory});
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   ::execv(arguments.front(), arguments.data());

@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using reconstruct::TradeoffPoint;
-using reconstruct::TradeoffSetting;
 
 struct Arguments {
   fs::path directory;
@@ -120,7 +119,7 @@ Result<void> run(Arguments& arguments) {
   const SystemClock clock;
   ProgressView view(terminal_options(), clock);
   std::vector<TradeoffPoint> points;
-  const auto done = measure_all(arguments, *data, view, points, stop.get_token());
+  auto done = measure_all(arguments, *data, view, points, stop.get_token());
   if (points.empty()) return done;
   if (auto drawn = draw_front(arguments.out, points); !drawn) return drawn;
   print_front(points, arguments.out);

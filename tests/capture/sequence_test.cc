@@ -119,7 +119,7 @@ TEST_F(SequenceTest, LeavesOutWhatIsLitDirectlyWhereTheLitFaceIsSeen) {
   for (int region = 0; region < 4; ++region) {
     const Illumination& light = set->illuminations[static_cast<std::size_t>(region)];
     const double left = 4.0 * (region % 2);
-    const double top = 4.0 * (region / 2);
+    const double top = region < 2 ? 0.0 : 4.0;
     for (int y = 0; y < 8; ++y) {
       for (int x = 0; x < 8; ++x) {
         const double dx = std::max({0.0, left - (x + 0.5), x + 0.5 - (left + 4.0)});

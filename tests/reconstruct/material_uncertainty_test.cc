@@ -86,7 +86,7 @@ TEST_F(MaterialUncertaintyTest, KnowsEveryChannelBetterThanBeforeAndTheSeenFaceB
 TEST_F(MaterialUncertaintyTest, CountsLayersFromTheSeenFace) {
   const auto result = compute();
   ASSERT_TRUE(result && result->has_value());
-  const std::size_t layer = 8 * 8;
+  const std::size_t layer = 64;
   const auto& cells = (*result)->material[1].reduced_scattering;
   double sum = 0.0;
   for (std::size_t i = cells.size() - layer; i < cells.size(); ++i) sum += cells[i] * cells[i];

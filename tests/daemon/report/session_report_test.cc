@@ -324,7 +324,7 @@ TEST_F(SessionReportTest, LeavesNotesWhereGnuplotIsMissing) {
   const NoPrograms none;
   const auto results = report();
   EXPECT_TRUE(results["relighting_error"].is_number());
-  EXPECT_THAT(page_, HasSubstr("14 of 14 plots could not be drawn"));
+  EXPECT_THAT(page_, HasSubstr("17 of 17 plots could not be drawn"));
   EXPECT_THAT(page_, HasSubstr("apt install gnuplot-nox"));
   EXPECT_THAT(section("convergence"), HasSubstr("Not drawn: Misfit"));
 }
@@ -343,7 +343,7 @@ TEST(StepProgress, ExpectsTheRestToGoAsFastAsWhatIsDone) {
 TEST_F(SessionReportTest, TellsHowFarEachStepIs) {
   report();
   for (const auto& [step, times] :
-       std::map<std::string, std::size_t>{{"lighting", 2}, {"relighting", 8}, {"report", 15}}) {
+       std::map<std::string, std::size_t>{{"lighting", 2}, {"relighting", 8}, {"report", 18}}) {
     const auto& heard = progress_.steps[step];
     ASSERT_EQ(heard.size(), times) << step;
     EXPECT_EQ(heard.front().fraction, 0.0);

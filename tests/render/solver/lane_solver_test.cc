@@ -12,7 +12,6 @@ namespace opaline::render {
 namespace {
 
 using reconstruct::diffusion::Termination;
-using ::testing::HasSubstr;
 
 /// Conductances between neighbours of an n x n x n grid, different in every
 /// channel; all but its corner in the dark of a small sink. `contrast`: every
