@@ -54,10 +54,8 @@ struct Level {
 /// cells are less than 1.7 times as long as the shortest ones, so point smoothing is enough for
 /// flat cells too.
 ///
-/// `medium` must be valid (diffusion/medium_check.h).
+/// `medium` must be valid (diffusion/medium_check.h). Who builds many of them keeps a diffusion/level_builder.h.
 std::vector<Level> build_levels(const Medium& medium);
-/// The same into `levels`, whatever they held: their memory is used again.
-void rebuild_levels(const Medium& medium, std::vector<Level>& levels);
 
 /// Red cells have an even sum of indices, on every level.
 constexpr bool is_red(int i, int j, int k) { return (i + j + k) % 2 == 0; }

@@ -10,21 +10,22 @@ namespace {
 using diffusion::Level;
 using diffusion::Medium;
 
-std::vector<double> with_y_and_z_exchanged(const Block& block, const std::vector<double>& values) {
-  std::vector<double> exchanged(values.size());
-  double* to = exchanged.data();
-  for (int j = 0; j < block.ny; ++j)
-    for (int k = 0; k < block.nz; ++k)
-      to = std::copy_n(values.data() + block.index(0, j, k), block.nx, to);
-  return exchanged;
-}
-
-Medium with_y_and_z_exchanged(const Medium& medium) {
+/// The same medium with the axes x, z, y.
+void exchange_y_and_z(const Medium& medium, ThreadTeam& team, Medium& exchanged) {
   const Block& b = medium.block;
-  return {{b.nx, b.nz, b.ny, b.hx, b.hz, b.hy},
-          with_y_and_z_exchanged(b, medium.diffusion),
-          with_y_and_z_exchanged(b, medium.absorption),
-          medium.boundary_a};
+  exchanged.block = {b.nx, b.nz, b.ny, b.hx, b.hz, b.hy};
+  exchanged.boundary_a = medium.boundary_a;
+  exchanged.diffusion.resize(b.cell_count());
+  exchanged.absorption.resize(b.cell_count());
+  team.run([&](int thread) {
+    for (int j = b.ny * thread / team.size(); j < b.ny * (thread + 1) / team.size(); ++j)
+      for (int k = 0; k < b.nz; ++k) {
+        const std::size_t from = b.index(0, j, k);
+        const std::size_t to = exchanged.block.index(0, k, j);
+        std::copy_n(medium.diffusion.data() + from, b.nx, exchanged.diffusion.data() + to);
+        std::copy_n(medium.absorption.data() + from, b.nx, exchanged.absorption.data() + to);
+      }
+  });
 }
 
 /// Where a level's arrays lie, each with a plane and a cell of zeros in front.
@@ -132,7 +133,8 @@ void build_host_grid(const Medium& medium, ThreadTeam& team, HostGrid<T>& grid) 
   const Block& block = medium.block;
   std::tie(grid.nx, grid.ny, grid.nz) = std::tuple_cat(block.cells());
   grid.exchanged = block.ny > block.nz;
-  diffusion::rebuild_levels(grid.exchanged ? with_y_and_z_exchanged(medium) : medium, grid.exact);
+  if (grid.exchanged) exchange_y_and_z(medium, team, grid.medium);
+  grid.builder.build(grid.exchanged ? grid.medium : medium, team, grid.exact);
   const std::vector<double>& diagonal = grid.exact.front().diagonal;
   grid.unit = *std::max_element(diagonal.begin(), diagonal.end());
   grid.levels.resize(grid.exact.size());

@@ -7,6 +7,7 @@
 
 #include "base/thread_team.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/diffusion/level_builder.h"
 #include "reconstruct/diffusion/multigrid.h"
 #include "reconstruct/host/buffer.h"
 
@@ -49,6 +50,8 @@ struct HostGrid {
   int ny = 1;
   int nz = 1;
   bool exchanged = false;  ///< the inner axis is z
+  diffusion::Medium medium;  ///< with the axes exchanged, where they are
+  diffusion::LevelBuilder builder;
 
   /// The first cell of line (y, z) in the caller's fields.
   std::size_t cell(int y, int z) const {
