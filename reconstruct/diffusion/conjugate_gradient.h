@@ -29,7 +29,7 @@ SolveSummary summarise(Termination termination, int iterations, double relative_
 /// its own step lengths. (Hestenes & Stiefel 1952; Saad, Iterative Methods for Sparse Linear
 /// Systems, 2nd ed., Algorithm 9.1.)
 ///
-/// The working precision may be single: whenever the recurred residual has fallen by 1e-4, and
+/// The working precision may be single: whenever the recurred residual has fallen by 1e-5, and
 /// before convergence is believed, it is replaced by b - K x in float64 (van der Vorst & Ye 2000,
 /// SIAM J. Sci. Comput. 22, section 3), so the solution reaches float64 accuracy.
 ///
@@ -41,7 +41,7 @@ SolveSummary conjugate_gradient(P& passes,
                                 std::span<const double> b_norms,
                                 const SolveOptions& options,
                                 const std::stop_token& stop) {
-  constexpr double kReplaceAfter = 1e-4;
+  constexpr double kReplaceAfter = 1e-5;
   double replaced = worst_ratio(passes.true_residual(), b_norms);
   if (replaced <= options.tolerance) return summarise(Termination::kConverged, 0, replaced);
   bool restart = true;
@@ -54,14 +54,18 @@ SolveSummary conjugate_gradient(P& passes,
     if (!std::isfinite(recurred)) return summarise(Termination::kBreakdown, iteration, recurred);
     restart = false;
     if (recurred > std::max(options.tolerance, kReplaceAfter * replaced)) continue;
+    if (recurred <= options.tolerance) {
+      const double reached = worst_ratio(passes.true_norm(), b_norms);
+      if (reached <= options.tolerance)
+        return summarise(Termination::kConverged, iteration, reached);
+    }
     const double actual = worst_ratio(passes.true_residual(), b_norms);
-    if (actual <= options.tolerance) return summarise(Termination::kConverged, iteration, actual);
     stalls = actual > 0.5 * replaced ? stalls + 1 : 0;
     if (stalls == 3) return summarise(Termination::kBreakdown, iteration, actual);
     restart = actual > 2.0 * recurred;
     replaced = actual;
   }
-  const double actual = worst_ratio(passes.true_residual(), b_norms);
+  const double actual = worst_ratio(passes.true_norm(), b_norms);
   return summarise(Termination::kIterationLimit, options.max_iterations, actual);
 }
 

@@ -17,6 +17,7 @@ namespace opaline::reconstruct::diffusion {
 /// true_residual()       x += d, d = 0, r = b - K x in float64, then rounded to the working
 /// precision.
 ///                       Returns ||r||^2 of every right-hand side, taken in float64.
+/// true_norm()           the same, but r need not be kept: true_residual() comes before anything that reads it.
 /// smooth_restrict(l)    for l < levels() - 1: one red-black Gauss-Seidel sweep on K z = r from z =
 /// 0, and the residual
 ///                       it leaves handed to r of level l + 1:
@@ -51,6 +52,7 @@ template <class P>
 concept DiffusionPasses = requires(P passes, int level, bool restart) {
   { passes.levels() } -> std::convertible_to<int>;
   { passes.true_residual() } -> std::convertible_to<std::span<const double>>;
+  { passes.true_norm() } -> std::convertible_to<std::span<const double>>;
   passes.smooth_restrict(level);
   passes.prolong_smooth(level);
   passes.apply_dot(restart);

@@ -62,7 +62,7 @@ double residual(const FieldLine& line, double scale, T* r, int nx) {
   const auto step = static_cast<int>(hn::Lanes(d));
   const V factor = hn::Set(d, scale);
   const double first = residual_at_first(l, nx);
-  r[0] = static_cast<T>(scale * first);
+  if (r != nullptr) r[0] = static_cast<T>(scale * first);
   V sum = hn::Zero(d);
   const M all = hn::FirstN(d, static_cast<std::size_t>(step));
   for (int i = 1; i < nx; i += step) {
@@ -73,7 +73,7 @@ double residual(const FieldLine& line, double scale, T* r, int nx) {
     const M inner = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - 1 - i));
     const V a = residual_at(l, i, cells, inner);
     sum = hn::MulAdd(a, a, sum);
-    store(hn::Mul(a, factor), r + i);
+    if (r != nullptr) store(hn::Mul(a, factor), r + i);
   }
   return first * first + hn::GetLane(hn::SumOfLanes(d, sum));
 }
@@ -89,6 +89,16 @@ void add(double* x, const T* c, double factor, int nx) {
     hn::StoreU(hn::MulAdd(f, load(c + i), hn::LoadU(d, x + i)), d, x + i);
   }
   for (; i < nx; ++i) x[i] += factor * static_cast<double>(c[i]);
+}
+
+template <class T>
+void set(double* x, const T* c, double factor, int nx) {
+  const D d;
+  const auto step = static_cast<int>(hn::Lanes(d));
+  const V f = hn::Set(d, factor);
+  int i = 0;
+  for (; i + step <= nx; i += step) hn::StoreU(hn::Mul(f, load(c + i)), d, x + i);
+  for (; i < nx; ++i) x[i] = factor * static_cast<double>(c[i]);
 }
 
 template <class T>
@@ -198,9 +208,11 @@ void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, 
 }
 #endif
 
-FieldKernels<float> single_kernels() { return {residual<float>, add<float>, to_fields, to_lanes}; }
+FieldKernels<float> single_kernels() {
+  return {residual<float>, add<float>, set<float>, to_fields, to_lanes};
+}
 FieldKernels<double> double_kernels() {
-  return {residual<double>, add<double>, to_fields, to_lanes};
+  return {residual<double>, add<double>, set<double>, to_fields, to_lanes};
 }
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE

@@ -28,10 +28,12 @@ constexpr std::size_t padded(int nx) { return (static_cast<std::size_t>(nx) + 31
 
 template <class T>
 struct FieldKernels {
-  /// r = scale (b - K x) along the line, padded(nx) long; returns the sum of (b - K x)^2.
+  /// r = scale (b - K x) along the line, padded(nx) long, unless r is null; returns the sum of (b - K x)^2.
   double (*residual)(const FieldLine& line, double scale, T* r, int nx);
   /// x += factor c.
   void (*add)(double* x, const T* c, double factor, int nx);
+  /// x = factor c.
+  void (*set)(double* x, const T* c, double factor, int nx);
   /// fields[m stride + i] = d + step[m] p of lane m in cell i; without d that is zero.
   void (*to_fields)(
       const T* d, const T* p, const T* step, T* fields, std::size_t stride, int width, int nx);

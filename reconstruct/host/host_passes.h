@@ -51,7 +51,8 @@ class HostPasses {
   HostPasses(ThreadTeam& team, const HostGrid<T>& grid, Workspace<T, S>& work, const Group& group);
 
   int levels() const { return static_cast<int>(grid_.levels.size()); }
-  std::span<const double> true_residual();
+  std::span<const double> true_residual() { return residual_pass(true); }
+  std::span<const double> true_norm() { return residual_pass(false); }
   void smooth_restrict(int level);
   void prolong_smooth(int level);
   void apply_dot(bool restart);
@@ -117,6 +118,7 @@ class HostPasses {
   void combine_halo(Slab slab);
   void update_slab(Slab slab, Direction mode);
   void rescale();
+  std::span<const double> residual_pass(bool keeps);
   void residual_slab(Slab slab, bool moves);
   void residual_ends(Slab slab);
   void add_correction(int z, int thread);
@@ -138,6 +140,8 @@ class HostPasses {
   bool correction_ = false;  ///< d holds something
   bool step_ = false;        ///< d lacks step_length p
   bool restart_ = false;
+  bool keeps_ = true;          ///< the residual pass stores r
+  bool sets_ = false;          ///< it sets x, which was zero
   std::array<T, 16> alpha_{};  ///< rho / gamma
   std::array<T, 16> step_length_{};
   std::array<T, 16> beta_{};

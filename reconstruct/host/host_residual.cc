@@ -6,9 +6,11 @@
 namespace opaline::reconstruct::host {
 
 template <class T, class S>
-std::span<const double> HostPasses<T, S>::true_residual() {
+std::span<const double> HostPasses<T, S>::residual_pass(bool keeps) {
+  keeps_ = keeps;
   const int parts = work_.parts(0);
   const bool moves = step_ || correction_;
+  sets_ = group_.x_is_zero;
   if (moves) group_.x_is_zero = false;
   std::fill(work_.norm_sums.begin(), work_.norm_sums.end(), 0.0);
   for_slabs(parts, grid_.nz, [&](Slab slab) { residual_slab(slab, moves); });
@@ -55,10 +57,11 @@ void HostPasses<T, S>::add_correction(int z, int thread) {
       if (scale_[m] == 0.0) continue;
       double* x = group_.x.field(group_.first + m) + grid_.cell(first, z);
       for (int n = 0; n < count; ++n)
-        fields_.add(x + static_cast<std::ptrdiff_t>(n) * grid_.nx,
-                    fields + (static_cast<std::size_t>(m) * count + n) * line,
-                    1.0 / (scale_[m] * grid_.unit),
-                    grid_.nx);
+        (sets_ ? fields_.set : fields_.add)(
+            x + static_cast<std::ptrdiff_t>(n) * grid_.nx,
+            fields + (static_cast<std::size_t>(m) * count + n) * line,
+            1.0 / (scale_[m] * grid_.unit),
+            grid_.nx);
     }
   });
 }
@@ -69,11 +72,12 @@ void HostPasses<T, S>::residual_plane(int z, int thread) {
   for_rows(thread, [&](int first, int count, T* fields, std::size_t line) {
     for (int m = 0; m < group_.count; ++m)
       for (int n = 0; n < count; ++n)
-        sums[m] += fields_.residual(field_line(m, first + n, z),
-                                    scale_[m] * growth_[m],
-                                    fields + (static_cast<std::size_t>(m) * count + n) * line,
-                                    grid_.nx);
-    for (int n = 0; n < count; ++n) {
+        sums[m] += fields_.residual(
+            field_line(m, first + n, z),
+            scale_[m] * growth_[m],
+            keeps_ ? fields + (static_cast<std::size_t>(m) * count + n) * line : nullptr,
+            grid_.nx);
+    for (int n = 0; keeps_ && n < count; ++n) {
       const auto [j, k] = grid_.row_of(first + n, z);
       fields_.to_lanes(fields + n * line, line * count, work_.r[0].row(j, k), width_, grid_.nx);
     }

@@ -15,7 +15,7 @@ namespace opaline::reconstruct::host::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Cells between what is read and what is asked for: the processor does not foresee every other cell of a row.
-constexpr std::ptrdiff_t kAhead = 16;
+constexpr std::ptrdiff_t kAhead = 8;
 
 /// The right-hand sides of one cell: W numbers in kCount registers.
 template <class T, int W>
