@@ -136,14 +136,16 @@ void sum_diagonal(Slab slab, const Parts& parts, Level& level) {
   const std::size_t end = plane_at(level, slab.end);
   std::size_t c = plane_at(level, slab.begin);
   for (; c < std::min(plane, end); ++c)
-    d[c] = sink[c] + gx[c] + (c < 1 ? 0.0 : gx[c - 1]) + gy[c] + (c < nx ? 0.0 : gy[c - nx]) + gz[c];
+    d[c] =
+        sink[c] + gx[c] + (c < 1 ? 0.0 : gx[c - 1]) + gy[c] + (c < nx ? 0.0 : gy[c - nx]) + gz[c];
   for (; c < end; ++c)  // a neighbour beyond the end of a line: its conductance is 0
     d[c] = sink[c] + gx[c] + gx[c - 1] + gy[c] + gy[c - nx] + gz[c] + gz[c - plane];
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side)
-      for_each_wall_cell(level, axis, side, slab, [&](std::size_t at, const Cells&, std::size_t place) {
-        d[at] += parts.wall[axis][side][place];
-      });
+      for_each_wall_cell(
+          level, axis, side, slab, [&](std::size_t at, const Cells&, std::size_t place) {
+            d[at] += parts.wall[axis][side][place];
+          });
 }
 
 Cells choose_ratio(const Level& level, const Parts& parts) {
@@ -162,8 +164,7 @@ void add_row(const double* values, int count, int ratio, double factor, double* 
     for (int n = 0; n < count; ++n) sums[n] += factor * values[n];
     return;
   }
-  for (int n = 0; n < count / 2; ++n)
-    sums[n] += factor * (values[2 * n] + values[2 * n + 1]);
+  for (int n = 0; n < count / 2; ++n) sums[n] += factor * (values[2 * n] + values[2 * n + 1]);
   if (count % 2 == 1) sums[count / 2] += factor * values[count - 1];
 }
 
@@ -214,7 +215,8 @@ void coarsen_along_row(const double* g, int n, double* weight, double* coarse) {
 }
 
 /// The same for a row of faces that lie across it, the cells behind them a stride away.
-void coarsen_across_row(const double* g, std::size_t stride, int count, bool paired, double* weight) {
+void coarsen_across_row(
+    const double* g, std::size_t stride, int count, bool paired, double* weight) {
   const double* inner = g - stride;
   const double* outer = g + stride;
   double* next = weight + stride;
@@ -249,11 +251,8 @@ void coarsen_faces(Level& fine, int axis, Slab slab, Level& coarse) {
       if (at % 2 == 0 || at + 1 == n) continue;
       const bool paired = at + 2 < n;
       coarsen_across_row(g + row, fine.stride(axis), fine.cells[0], paired, weight + row);
-      add_row(g + row,
-              fine.cells[0],
-              ratio[0],
-              1.0 / ((paired ? 2.0 : 1.5) * kOvercorrection),
-              above);
+      add_row(
+          g + row, fine.cells[0], ratio[0], 1.0 / ((paired ? 2.0 : 1.5) * kOvercorrection), above);
     }
 }
 
@@ -294,9 +293,10 @@ void coarsen_slab(Level& fine, const Parts& from, Slab slab, Level& coarse, Part
   for (int axis = 0; axis < 3; ++axis) {
     clear(coarse, slab, coarse.conductance[axis]);
     for (int side = 0; side < 2; ++side)
-      for_each_wall_cell(coarse, axis, side, slab, [&](std::size_t, const Cells&, std::size_t place) {
-        parts.wall[axis][side][place] = 0.0;
-      });
+      for_each_wall_cell(
+          coarse, axis, side, slab, [&](std::size_t, const Cells&, std::size_t place) {
+            parts.wall[axis][side][place] = 0.0;
+          });
     if (fine.ratio[axis] == 2)
       coarsen_faces(fine, axis, cells, coarse);
     else

@@ -49,7 +49,7 @@ struct HostGrid {
   int nx = 1;  ///< of the caller's block
   int ny = 1;
   int nz = 1;
-  bool exchanged = false;  ///< the inner axis is z
+  bool exchanged = false;    ///< the inner axis is z
   diffusion::Medium medium;  ///< with the axes exchanged, where they are
   diffusion::LevelBuilder builder;
 
