@@ -212,13 +212,15 @@ void measure_growth() {
   for (const auto& [name, tets] : {std::pair{"100k", 1e5}, std::pair{"1M", 1e6}}) {
     bench::LitObject object(bench::cut(*bench::shape("torus"), tets), team, 0);
     std::vector<double> seconds;
+    int iterations = 0;
     for (int round = 0; round < 5; ++round) {
       const Stopwatch watch;
-      object.frame(0.0, kTolerance, true);
+      iterations = object.frame(0.0, kTolerance, true).iterations;
       seconds.push_back(watch.cpu());
     }
     cost[name] = 1e9 * bench::median(seconds) / static_cast<double>(object.graph().inner.size());
     bench::print_figure("render.nanoseconds_per_node", name, cost[name], "ns");
+    bench::print_figure("render.cold_iterations", name, iterations, "1");
   }
   bench::print_figure("render.cost_growth", "100k-1M", cost["1M"] / cost["100k"], "1");
 }

@@ -87,7 +87,7 @@ LitObject::LitObject(const render::TetMesh& mesh, ThreadTeam& team, int remember
 SolveSummary LitObject::frame(double degrees, double tolerance, bool cold) {
   for (std::size_t s = 0; s < q_.size(); ++s) q_[s] = light_around(graph_.surface[s], degrees);
   if (cold) {
-    solver_->matrix_changed();
+    solver_->forget();
     std::ranges::fill(phi_, Lanes<float>::zero());
   }
   diffusion_.load(q_, b_);

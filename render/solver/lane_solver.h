@@ -37,8 +37,11 @@ class LaneSolver {
                                              const reconstruct::diffusion::SolveOptions& options,
                                              std::stop_token stop);
 
-  /// The hierarchy stays, and serves until the matrix has changed much.
-  void matrix_changed() { history_.clear(); }
+  /// The hierarchy stays, and serves until the matrix has changed much. One product for every remembered solution: the next start
+  /// is their best combination for the new matrix.
+  void matrix_changed() { history_.refresh(matrix_, team_); }
+  /// Starts from x alone next time.
+  void forget() { history_.clear(); }
   void rebuild(const HierarchyOptions& options) { hierarchy_ = Hierarchy<T>(matrix_, options); }
   const Hierarchy<T>& hierarchy() const { return hierarchy_; }
 

@@ -71,6 +71,17 @@ void SolutionHistory<T>::add(const std::vector<Lanes<T>>& x, const std::vector<L
 }
 
 template <class T>
+void SolutionHistory<T>::refresh(const LaneMatrix<T>& matrix, ThreadTeam& team) {
+  for (Solution& solution : kept_)
+    team.run([&](int thread) {
+      const FlushDenormals flush;
+      const RowRange range = share_of(matrix.rows(), thread, team.size());
+      for (int i = range.first; i < range.last; ++i)
+        solution.ax[i] = apply_row(matrix, solution.x.data(), i);
+    });
+}
+
+template <class T>
 std::vector<Lanes<T>> SolutionHistory<T>::best_combination(const std::vector<Lanes<T>>& b,
                                                            ThreadTeam& team) const {
   const auto n = static_cast<int>(kept_.size());

@@ -21,8 +21,9 @@ class SolutionHistory {
 
   /// Remembers x with A x, the oldest giving way.
   void add(const std::vector<Lanes<T>>& x, const std::vector<Lanes<T>>& ax);
-  /// To be called when the matrix changes.
   void clear() { kept_.clear(); }
+  /// Makes the A x of another matrix: what an edit changes is mostly what the one before it changed.
+  void refresh(const LaneMatrix<T>& matrix, ThreadTeam& team);
 
   /// Replaces x by the best combination; leaves it where nothing is remembered.
   void guess(const std::vector<Lanes<T>>& b, std::vector<Lanes<T>>& x, ThreadTeam& team) const;
