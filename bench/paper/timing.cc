@@ -70,12 +70,13 @@ Dataset unseen(const Material& material) {
       for (int x = 0; x < b.nx; ++x)
         if (x * kRegions / b.nx == r % kRegions && y * kRegions / b.ny == r / kRegions)
           for (int c = 0; c < kColorChannels; ++c) light.at(x, y, c) = 1.0F;
-    dataset.illuminations.push_back({.name = fmt::format("region_{}", r),
-                                     .held_out = false,
-                                     .irradiance = std::move(light),
-                                     .radiance = Image<float>(b.nx, b.ny, kColorChannels),
-                                     .radiance_variance = Image<float>(b.nx, b.ny, kColorChannels),
-                                     .mask = Image<std::uint8_t>(b.nx, b.ny, 1, 1)});
+    dataset.illuminations.push_back(
+        {.name = fmt::format("region_{}", r),
+         .held_out = false,
+         .irradiance = std::move(light),
+         .radiance = Image<float>(b.nx, b.ny, kColorChannels),
+         .radiance_variance = Image<float>(b.nx, b.ny, kColorChannels, 1.0F),
+         .mask = Image<std::uint8_t>(b.nx, b.ny, 1, 1)});
   }
   return dataset;
 }
