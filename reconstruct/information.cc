@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -30,10 +32,17 @@ std::vector<double> less_mean(std::vector<double> u) {
   return u;
 }
 
+void take_out(const MatrixXd& rows, const VectorXd& residual, NormalEquations& from) {
+  from.hessian.selfadjointView<Eigen::Lower>().rankUpdate(rows, -1.0);
+  from.gradient -= rows * residual;
+  from.norm -= residual.squaredNorm();
+}
+
 }  // namespace
 
 struct Information::Point {
   ChannelProblem problem;  // radiances are misfits
+  ChannelProblem measured;
   ChannelCoefficients coefficients;
   std::vector<double> diffusion_less_mean;  // of the logarithms
   std::vector<double> absorption_less_mean;
@@ -41,12 +50,6 @@ struct Information::Point {
   FieldBatch fluence;    // per illumination
   FieldBatch adjoint;    // per probe
 };
-
-void Information::Sums::add(const Sums& other) {
-  hessian += other.hessian;
-  gradient += other.gradient;
-  norm += other.norm;
-}
 
 Information::Information(const ChannelProblem& problem,
                          diffusion::FluenceSolver& solver,
@@ -56,7 +59,9 @@ Information::Information(const ChannelProblem& problem,
       options_(options),
       grid_(coarser_block(problem.block, options.cells)),
       diffusion_(problem.block, grid_, options.length_mm, options.diffusion_modes),
-      absorption_(problem.block, grid_, options.length_mm, options.absorption_modes) {}
+      absorption_(problem.block, grid_, options.length_mm, options.absorption_modes),
+      shapes_(grid_, problem.seen_face, mixing_length(problem.block, problem.seen_face)),
+      discrepancies_(problem.illuminations.size()) {}
 
 Result<ChannelProblem> Information::coarse_misfit(const ChannelCoefficients& estimate,
                                                   std::stop_token stop) {
@@ -86,13 +91,14 @@ Result<void> Information::gather(const ChannelCoefficients& estimate, std::stop_
   absorption = average_cells(fine_.block, grid_, std::move(absorption));
   Point at;
   at.problem = *std::move(misfit);
+  at.measured = coarsen(fine_, grid_);
   for (std::size_t i = 0; i < diffusion.size(); ++i) {
     at.coefficients.absorption.push_back(std::exp(absorption[i]));
     at.coefficients.reduced_scattering.push_back(
         std::max(std::exp(-diffusion[i]) / 3.0 - at.coefficients.absorption[i], kLeastScattering));
   }
-  at.diffusion_less_mean = less_mean(std::move(diffusion));
-  at.absorption_less_mean = less_mean(std::move(absorption));
+  at.diffusion_less_mean = diffusion_.kept_part(less_mean(std::move(diffusion)));
+  at.absorption_less_mean = absorption_.kept_part(less_mean(std::move(absorption)));
   if (auto solved = solve_all(at, stop); !solved) return solved;
   add_all_rows(at, stop);
   if (stop.stop_requested()) return cancelled("posterior");
@@ -139,7 +145,7 @@ Result<FieldBatch> Information::solve(const FieldBatch& b, std::stop_token stop)
 }
 
 // The rows of one picture: the adjoint gradient of each datum, from two Green's functions.
-void Information::add_rows(const Point& at, std::size_t illumination, Sums& sums) const {
+void Information::add_rows(const Point& at, std::size_t illumination, NormalEquations& sums) {
   ChannelProblem single = at.problem;
   single.illuminations = {at.problem.illuminations[illumination]};
   const ChannelIllumination& data = single.illuminations.front();
@@ -168,6 +174,38 @@ void Information::add_rows(const Point& at, std::size_t illumination, Sums& sums
   sums.hessian.selfadjointView<Eigen::Lower>().rankUpdate(rows);
   sums.gradient += rows * g;
   sums.norm += g.squaredNorm();
+  const MatrixXd shapes = shapes_.whitened(at.measured.illuminations[illumination]);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> modes(shapes.transpose() * shapes);
+  const MatrixXd turned = shapes * modes.eigenvectors();
+  discrepancies_[illumination] = {rows * turned,
+                                  turned.transpose() * g,
+                                  modes.eigenvalues().cwiseMax(0.0),
+                                  modes.eigenvectors()};
+}
+
+NormalEquations Information::normal_equations(double discrepancy) const {
+  NormalEquations out = sums_;
+  if (discrepancy == 0.0) return out;
+  const double own = (1.0 - DiscrepancyShapes::kCommonShare) * discrepancy * discrepancy;
+  const double shared = DiscrepancyShapes::kCommonShare * discrepancy * discrepancy;
+  const Index shapes = shapes_.size();
+  MatrixXd rows = MatrixXd::Zero(size(), shapes);
+  MatrixXd strength = MatrixXd::Identity(shapes, shapes) / shared;
+  VectorXd residual = VectorXd::Zero(shapes);
+  for (const Discrepancy& d : discrepancies_) {
+    const VectorXd left = (1.0 + own * d.strength.array()).inverse();
+    const VectorXd root = (own * left.array()).sqrt();
+    take_out(d.rows * root.asDiagonal(), root.cwiseProduct(d.residual), out);
+    const MatrixXd turn = left.asDiagonal() * d.turn.transpose();
+    rows += d.rows * turn;
+    strength += d.turn * d.strength.asDiagonal() * turn;
+    residual += turn.transpose() * d.residual;
+  }
+  const Eigen::LLT<MatrixXd> factors(strength);
+  take_out(factors.matrixL().solve(rows.transpose()).transpose(),
+           factors.matrixL().solve(residual),
+           out);
+  return out;
 }
 
 void Information::add_all_rows(const Point& at, std::stop_token stop) {
@@ -175,8 +213,8 @@ void Information::add_all_rows(const Point& at, std::stop_token stop) {
   const std::size_t asked =
       options_.threads > 0 ? options_.threads : std::max(1U, std::thread::hardware_concurrency());
   const std::size_t count = std::min({asked, pictures, std::size_t{8}});
-  const Sums zero{MatrixXd::Zero(size(), size()), VectorXd::Zero(size()), 0.0};
-  std::vector<Sums> sums(count, zero);
+  const NormalEquations zero{MatrixXd::Zero(size(), size()), VectorXd::Zero(size())};
+  std::vector<NormalEquations> sums(count, zero);
   {
     std::vector<std::jthread> threads;
     for (std::size_t t = 0; t < count; ++t) {
@@ -187,7 +225,11 @@ void Information::add_all_rows(const Point& at, std::stop_token stop) {
     }
   }
   sums_ = std::move(sums.front());
-  for (std::size_t t = 1; t < count; ++t) sums_.add(sums[t]);
+  for (std::size_t t = 1; t < count; ++t) {
+    sums_.hessian += sums[t].hessian;
+    sums_.gradient += sums[t].gradient;
+    sums_.norm += sums[t].norm;
+  }
 }
 
 }  // namespace opaline::reconstruct

@@ -61,7 +61,9 @@ class Uncertainties {
         material_(found.material),
         posterior_(posterior),
         context_(context),
-        start_(context.clock.now()) {}
+        start_(context.clock.now()) {
+    posterior_.discrepancy = options.model_error;
+  }
 
   Result<UncertaintyResult> run(const std::stop_token& stop) {
     result_.length_mm = posterior_.length_mm;
@@ -126,7 +128,7 @@ class Uncertainties {
   Dataset dataset_;
   const InverseOptions& options_;
   const Material& material_;
-  const PosteriorOptions& posterior_;
+  PosteriorOptions posterior_;
   const UncertaintyContext& context_;
   std::chrono::nanoseconds start_;
   UncertaintyResult result_;

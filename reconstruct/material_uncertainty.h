@@ -53,7 +53,7 @@ struct UncertaintyContext {
 };
 
 /// The posterior (reconstruct/posterior.h) of each channel at what reconstruct_reduced() found in `dataset`, on the
-/// dataset's own grid and from the same pictures, masks and weights. Nothing where every channel came out homogeneous: the
+/// dataset's own grid and from the same pictures, masks and weights; options.model_error is also its discrepancy. Nothing where every channel came out homogeneous: the
 /// 95 % intervals of its two numbers (reconstruct/homogeneous_fit.h) say it all.
 ///
 /// Events: progress "uncertainty" before each channel and at the end, {channel}.

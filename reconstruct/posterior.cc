@@ -5,6 +5,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "reconstruct/information.h"
 #include "reconstruct/resample.h"
@@ -26,28 +28,28 @@ VectorXd deviations(const Information& info, const PriorOptions& k, const PriorO
   return d;
 }
 
-// 1 + S A^T A S.
-Eigen::LLT<MatrixXd> whitened(const Information& info, const VectorXd& d) {
-  MatrixXd p = d.asDiagonal() * info.hessian() * d.asDiagonal();
+// 1 + S A^T R^-1 A S.
+Eigen::LLT<MatrixXd> whitened(const NormalEquations& normal, const VectorXd& d) {
+  MatrixXd p = d.asDiagonal() * normal.hessian * d.asDiagonal();
   p.diagonal().array() += 1.0;
   return Eigen::LLT<MatrixXd>(p);
 }
 
-double evidence(const Information& info, const PriorOptions& k, const PriorOptions& a) {
-  const VectorXd d = deviations(info, k, a);
-  const auto factors = whitened(info, d);
-  const VectorXd h = d.cwiseProduct(info.gradient());
-  return -0.5 * (info.norm() - h.dot(factors.solve(h))) -
+double evidence(const NormalEquations& normal, const VectorXd& d) {
+  const auto factors = whitened(normal, d);
+  const VectorXd h = d.cwiseProduct(normal.gradient);
+  return -0.5 * (normal.norm - h.dot(factors.solve(h))) -
          factors.matrixLLT().diagonal().array().log().sum();
 }
 
 // Golden section over log amplitude.
 double likeliest_amplitude(const Information& info,
+                           const NormalEquations& normal,
                            PriorOptions diffusion,
                            const PriorOptions& absorption) {
   const auto at = [&](double log_amplitude) {
     diffusion.amplitude = std::exp(log_amplitude);
-    return evidence(info, diffusion, absorption);
+    return evidence(normal, deviations(info, diffusion, absorption));
   };
   constexpr double kGolden = 0.6180339887498949;
   double low = std::log(kLeastAmplitude);
@@ -77,6 +79,45 @@ struct Variances {  // per cell of the block
   std::vector<double> absorption;
   std::vector<double> both;  // covariance
 };
+
+LogFields logarithms(const ChannelCoefficients& c) {
+  LogFields u;
+  for (std::size_t i = 0; i < c.absorption.size(); ++i) {
+    u.diffusion.push_back(-std::log(3.0 * (c.absorption[i] + c.reduced_scattering[i])));
+    u.absorption.push_back(std::log(c.absorption[i]));
+  }
+  return u;
+}
+
+// mean + F y - u.
+std::vector<double> shift_to(const Information& info,
+                             const Block& block,
+                             const CosinePrior& basis,
+                             const VectorXd& y,
+                             std::vector<double> u) {
+  const double mean = std::accumulate(u.begin(), u.end(), 0.0) / static_cast<double>(u.size());
+  const VectorXd coarse = basis.values() * y;
+  const auto fine =
+      interpolate_cells(info.grid(), block, {coarse.data(), coarse.data() + coarse.size()});
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = mean + fine[i] - u[i];
+  return u;
+}
+
+LogFields shift_to(const Information& info, const Block& block, const VectorXd& y, LogFields at) {
+  const CosinePrior& k = info.diffusion();
+  const CosinePrior& a = info.absorption();
+  return {shift_to(info, block, k, y.head(k.size()), std::move(at.diffusion)),
+          shift_to(info, block, a, y.tail(a.size()), std::move(at.absorption))};
+}
+
+// From those about the mean to those about a point that it was shifted from.
+void add_shift(const LogFields& shift, Variances& v) {
+  for (std::size_t i = 0; i < v.both.size(); ++i) {
+    v.diffusion[i] += shift.diffusion[i] * shift.diffusion[i];
+    v.absorption[i] += shift.absorption[i] * shift.absorption[i];
+    v.both[i] += shift.diffusion[i] * shift.absorption[i];
+  }
+}
 
 // diag(F C G^T).
 VectorXd diagonal(const MatrixXd& f, const MatrixXd& c, const MatrixXd& g) {
@@ -147,6 +188,9 @@ Result<void> validate(const PosteriorOptions& o) {
     return invalid_argument(fmt::format("posterior: length_mm = {}; expected > 0", o.length_mm));
   if (!(o.tolerance > 0.0))
     return invalid_argument(fmt::format("posterior: tolerance = {}; expected > 0", o.tolerance));
+  if (!(o.discrepancy >= 0.0) || !std::isfinite(o.discrepancy))
+    return invalid_argument(
+        fmt::format("posterior: discrepancy = {}; expected >= 0", o.discrepancy));
   if (o.cells < 1 || o.diffusion_modes < 1 || o.absorption_modes < 1)
     return invalid_argument("posterior: cells and modes; expected >= 1");
   return ok();
@@ -160,19 +204,24 @@ Result<ChannelPosterior> posterior(const ChannelProblem& problem,
   if (auto valid = validate(options); !valid) return valid.error();
   Information info(problem, solver, options);
   if (auto gathered = info.gather(estimate, std::move(stop)); !gathered) return gathered.error();
+  const NormalEquations normal = info.normal_equations(options.discrepancy);
   ChannelPosterior out;
   out.diffusion = options.diffusion;
   out.absorption = options.absorption;
   if (options.find_amplitude)
-    out.diffusion.amplitude = likeliest_amplitude(info, out.diffusion, out.absorption);
+    out.diffusion.amplitude = likeliest_amplitude(info, normal, out.diffusion, out.absorption);
   const VectorXd d = deviations(info, out.diffusion, out.absorption);
-  const MatrixXd covariance = whitened(info, d).solve(MatrixXd::Identity(info.size(), info.size()));
+  const auto factors = whitened(normal, d);
+  const MatrixXd covariance = factors.solve(MatrixXd::Identity(info.size(), info.size()));
   const Index nk = info.diffusion().size();
   const Index na = info.absorption().size();
   out.determined_diffusion = static_cast<double>(nk) - covariance.diagonal().head(nk).sum();
   out.determined_absorption = static_cast<double>(na) - covariance.diagonal().tail(na).sum();
-  out.deviation = uncertainty(
-      variances(info, problem.block, covariance, out.diffusion, out.absorption), estimate);
+  const VectorXd y = d.cwiseProduct(factors.solve(d.cwiseProduct(normal.gradient)));
+  out.shift = shift_to(info, problem.block, y, logarithms(estimate));
+  Variances about = variances(info, problem.block, covariance, out.diffusion, out.absorption);
+  add_shift(out.shift, about);
+  out.deviation = uncertainty(about, estimate);
   out.grid = info.grid();
   out.solves = info.solves();
   return out;

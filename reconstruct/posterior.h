@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <stop_token>
+#include <vector>
 
 #include "base/block.h"
 #include "base/material.h"
@@ -29,6 +30,7 @@ struct PosteriorOptions {
   PriorOptions absorption{1.5, 0.45};  ///< of log sigma_a
   double length_mm = 2.0;              ///< correlation length of both; > 0
   bool find_amplitude = true;          ///< of log kappa, by the largest evidence
+  double discrepancy = 0.01;           ///< eps of DiscrepancyShapes: the model's smooth error; >= 0
   std::size_t cells = 4096;  ///< at most, of the grid the pictures' information lives on; >= 1
   std::size_t diffusion_modes = 1200;  ///< cosines of log kappa that the pictures may inform; >= 1
   std::size_t absorption_modes = 300;  ///< of log sigma_a; >= 1
@@ -36,11 +38,18 @@ struct PosteriorOptions {
   int threads = 0;                     ///< of the algebra; 0: one a core
 };
 
+/// Per cell.
+struct LogFields {
+  std::vector<double> diffusion;   ///< of log kappa
+  std::vector<double> absorption;  ///< of log sigma_a
+};
+
 /// How well one channel is known.
 struct ChannelPosterior {
-  ChannelUncertainty deviation;
-  PriorOptions diffusion;   ///< as used
-  PriorOptions absorption;  ///< as used
+  ChannelUncertainty deviation;  ///< about the estimate: (variance + shift^2)^(1/2)
+  LogFields shift;               ///< the posterior's mean less the estimate
+  PriorOptions diffusion;        ///< as used
+  PriorOptions absorption;       ///< as used
   double determined_diffusion =
       0.0;  ///< effective number of parameters that the pictures determine
   double determined_absorption = 0.0;
@@ -51,30 +60,33 @@ struct ChannelPosterior {
 /// Posterior standard deviations of log kappa, log sigma_a and log sigma_s' per cell: the Laplace
 /// approximation with Gauss-Newton's Hessian at `estimate`,
 ///
-///   u = F y,   y ~ N(0, S^2) a priori (CosinePrior),   A = J F,
-///   cov(u) = F (S^-2 + A^T A)^-1 F^T + what the prior leaves to the cosines not in F
+///   u = mean + F y,   y ~ N(0, S^2) a priori (CosinePrior),   A = J F,
+///   C = F (S^-2 + A^T R^-1 A)^-1 F^T + what the prior leaves to the cosines not in F
 ///
-/// with J the Jacobian of the whitened radiances sqrt(w) L by (log kappa, log sigma_a): the weights
-/// hold the measured noise and InverseOptions::model_error, so a known discrepancy of the model
-/// counts as noise.
+/// with J the Jacobian of the whitened radiances sqrt(w) L by (log kappa, log sigma_a) and R the
+/// covariance of their errors: 1 for the measured noise and InverseOptions::model_error in w, and the
+/// model's smooth discrepancy (reconstruct/discrepancy.h).
+///
+/// The reconstruction is not this prior's maximum: it minimises with the regulariser and stops at
+/// the noise. So a deviation about it is (C_ii + shift_i^2)^(1/2), the shift to the posterior's mean by one
+/// Gauss-Newton step in the same cosines:
+///
+///   shift = mean + F y - estimate,   y = (S^-2 + A^T R^-1 A)^-1 A^T R^-1 g,   g = J d - r
+///
+/// d: the kept cosines' part of the estimate less its mean, r its whitened residual. What the estimate has
+/// beyond the kept cosines stays in r: in d, which they would have to make good, it moved the
+/// mean by several deviations. Where the model bends, one step is not all: see docs/physics.md.
 ///
 /// J is not probed by products, two batched solves each for hundreds of cosines, but written down
 /// row by row by reciprocity (Arridge, Inverse Problems 15, R41 (1999), sec. 5): one solve for each
 /// illumination and one for each point of the seen face give every row, the adjoint gradient of that
 /// one datum. This is done on a coarser grid, and for the smoothest cosines: what these cannot resolve
-/// keeps its prior variance, and is not counted among what blurs the rest. Amplitudes by the largest evidence
-/// (MacKay, Neural Computation 4, 415 (1992)):
+/// keeps its prior variance, and is not counted among what blurs the rest. The amplitude of log kappa by
+/// the largest evidence (MacKay, Neural Computation 4, 415 (1992)):
 ///
-///   log p(data | S) = -1/2 (|g|^2 - h^T y) - 1/2 log det(1 + S A^T A S),   h = A^T g, g = J d - r
+///   log p(data | S) = -1/2 (g^T R^-1 g - h^T y) - 1/2 log det(1 + S A^T R^-1 A S),   h = A^T R^-1 g
 ///
-/// d the estimate less its mean, r its whitened residual.
-///
-/// The reconstruction is not this prior's maximum: it minimises with the regulariser and stops at
-/// the noise. The deviations are those of the posterior at that point, not about another; what the
-/// early stop adds to the error, 10 to 30 % of it on simulated samples far from the seen face, is
-/// not in them.
-///
-/// Memory: about 8 (modes^2 (2 + threads) + seen coarse cells (cells + modes threads)) bytes.
+/// Memory: about 8 (modes^2 (2 + threads) + modes shapes pictures + seen coarse cells (cells + modes threads)) bytes.
 /// Errors:  kInvalidArgument for options; kCancelled; the solver's; kInternal when a solve stays
 /// far from its tolerance or the Hessian is not finite.
 Result<ChannelPosterior> posterior(const ChannelProblem& problem,

@@ -44,7 +44,9 @@ CosinePrior::CosinePrior(const Block& block,
                          const Block& coarse,
                          double length_mm,
                          std::size_t modes)
-    : coarse_(coarse) {
+    : coarse_(coarse),
+      cells_ratio_(static_cast<double>(block.cell_count()) /
+                   static_cast<double>(coarse.cell_count())) {
   ENSURE(length_mm > 0.0 && modes >= 1);
   const auto n = block.cells();
   std::vector<double> s;
@@ -97,6 +99,24 @@ void CosinePrior::project(std::span<const double> field, Eigen::Ref<Eigen::Vecto
     const auto& k = kept_[m].k;
     out[static_cast<Index>(m) + 1] = spectrum[coarse_.index(k[0], k[1], k[2])];
   }
+}
+
+// The cosines are orthogonal on the centres of the coarse cells, which are fewer than those they are normalised on.
+std::vector<double> CosinePrior::kept_part(std::span<const double> field) const {
+  ENSURE(field.size() == coarse_.cell_count());
+  std::vector<double> unscaled(field.begin(), field.end());
+  for (std::size_t i = 0; i < unscaled.size(); ++i) unscaled[i] /= scale_[i];
+  const std::array<MatrixXd, 3> transposed{
+      points_[0].transpose(), points_[1].transpose(), points_[2].transpose()};
+  const auto spectrum = multiply_along_axes(coarse_.cells(), transposed, std::move(unscaled));
+  std::vector<double> kept(spectrum.size(), 0.0);
+  for (const Mode& mode : kept_) {
+    const std::size_t at = coarse_.index(mode.k[0], mode.k[1], mode.k[2]);
+    kept[at] = spectrum[at] * cells_ratio_;
+  }
+  kept = multiply_along_axes(coarse_.cells(), points_, std::move(kept));
+  for (std::size_t i = 0; i < kept.size(); ++i) kept[i] *= scale_[i];
+  return kept;
 }
 
 MatrixXd CosinePrior::values() const {

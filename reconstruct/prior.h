@@ -36,6 +36,8 @@ class CosinePrior {
   Eigen::VectorXd deviations(const PriorOptions& options) const;
   /// sum over coarse cells of `field` times each unscaled cosine's cell mean: F^T field.
   void project(std::span<const double> field, Eigen::Ref<Eigen::VectorXd> out) const;
+  /// The part of a field on the coarse grid, less its mean, that the kept cosines make up.
+  std::vector<double> kept_part(std::span<const double> field) const;
   /// The unscaled cosines at the centres of the coarse cells, cells x size().
   Eigen::MatrixXd values() const;
 
@@ -45,6 +47,7 @@ class CosinePrior {
     double root = 0.0;  // s^(1/2)
   };
   Block coarse_;
+  double cells_ratio_;
   std::array<Eigen::MatrixXd, 3> points_;  // per axis: cosines at the centres, cells x modes
   std::array<Eigen::MatrixXd, 3> means_;   // over the cells
   std::vector<Mode> kept_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "base/clock.h"
@@ -25,6 +26,7 @@ struct Layer {
   double variance = 0.0;
   double prior = 0.0;  // variances
   double shape = 0.0;
+  double error2 = 0.0;
 
   double z_mean() const { return z / count; }
   double z_sd() const { return std::sqrt(z2 / count - z_mean() * z_mean()); }
@@ -52,9 +54,25 @@ void add(const Dataset& dataset,
     layer.z2 += z * z;
     layer.within += std::abs(z) <= 2.0 ? 1.0 : 0.0;
     layer.variance += deviation[i] * deviation[i];
+    layer.error2 += error[i] * error[i];
     layer.shape += prior.amplitude * prior.amplitude;
     layer.prior += prior.amplitude * prior.amplitude + prior.level * prior.level;
   }
+}
+
+/// About the posterior's own mean instead of the estimate.
+struct Centred {
+  std::vector<double> error;
+  std::vector<double> deviation;
+};
+Centred centred(std::vector<double> error,
+                std::vector<double> deviation,
+                const std::vector<double>& shift) {
+  for (std::size_t i = 0; i < shift.size(); ++i) {
+    error[i] += shift[i];
+    deviation[i] = std::sqrt(std::max(deviation[i] * deviation[i] - shift[i] * shift[i], 1e-12));
+  }
+  return {std::move(error), std::move(deviation)};
 }
 
 double extinction(const ChannelCoefficients& c, std::size_t i) {
@@ -79,6 +97,7 @@ void print(const Dataset& dataset, const std::string& name, const std::vector<La
     all.count += layer.count;
     all.within += layer.within;
     all.z += layer.z;
+    all.error2 += layer.error2;
     if ((static_cast<double>(k) + 1.0) * h > 2.0 + 1e-9) continue;
     top.variance += layer.variance;
     top.prior += layer.prior;
@@ -88,6 +107,7 @@ void print(const Dataset& dataset, const std::string& name, const std::vector<La
   print_figure("posterior.z_sd_most", name, most, "1");
   print_figure("posterior.bias", name, all.z_mean(), "1");
   print_figure("posterior.coverage_2sigma", name, all.within / all.count, "1");
+  print_figure("posterior.rms_error", name, std::sqrt(all.error2 / all.count), "1");
   if (top.variance == 0.0) return;
   print_figure("posterior.tightening_top2mm", name, std::sqrt(top.prior / top.variance), "x");
   print_figure(
@@ -109,6 +129,8 @@ Result<void> print_posterior(const std::string& name,
       dataset.block.cells()[static_cast<std::size_t>(axis_of(dataset.seen_face))]);
   std::vector<Layer> diffusion(layer_count);
   std::vector<Layer> absorption(layer_count);
+  std::vector<Layer> diffusion_mean(layer_count);
+  std::vector<Layer> absorption_mean(layer_count);
   for (int channel = 0; channel < kColorChannels; ++channel) {
     const auto c = static_cast<std::size_t>(channel);
     const ChannelCoefficients& is = found.channels[c];
@@ -117,7 +139,8 @@ Result<void> print_posterior(const std::string& name,
         reconstruct::make_channel_problem(dataset, channel, options, reconstruct::Selection::kFit);
     if (!problem) return problem.error();
     const auto start = clock.now();
-    const auto known = reconstruct::posterior(*problem, solver, is, {}, {});
+    const auto known =
+        reconstruct::posterior(*problem, solver, is, {.discrepancy = options.model_error}, {});
     if (!known) return known.error();
     seconds += std::chrono::duration<double>(clock.now() - start).count();
     solves = std::max(solves, known->solves);
@@ -129,6 +152,10 @@ Result<void> print_posterior(const std::string& name,
     }
     add(dataset, by_diffusion, known->deviation.diffusion, known->diffusion, diffusion);
     add(dataset, by_absorption, known->deviation.absorption, known->absorption, absorption);
+    const auto by_k = centred(by_diffusion, known->deviation.diffusion, known->shift.diffusion);
+    const auto by_a = centred(by_absorption, known->deviation.absorption, known->shift.absorption);
+    add(dataset, by_k.error, by_k.deviation, known->diffusion, diffusion_mean);
+    add(dataset, by_a.error, by_a.deviation, known->absorption, absorption_mean);
     const std::string where = fmt::format("{}, {}", name, kChannelNames[c]);
     print_figure("posterior.amplitude_found", where, known->diffusion.amplitude, "1");
     print_figure("posterior.determined_diffusion", where, known->determined_diffusion, "1");
@@ -136,6 +163,8 @@ Result<void> print_posterior(const std::string& name,
   }
   print(dataset, name + ", log kappa", diffusion);
   print(dataset, name + ", log sigma_a", absorption);
+  print(dataset, name + ", log kappa, posterior mean", diffusion_mean);
+  print(dataset, name + ", log sigma_a, posterior mean", absorption_mean);
   print_figure("posterior.solves", name, static_cast<double>(solves), "1");
   print_figure("posterior.seconds", name, seconds, "s");
   return ok();

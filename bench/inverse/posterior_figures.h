@@ -16,9 +16,13 @@ namespace opaline::bench {
 ///   posterior.coverage_2sigma    share of the cells whose truth is within two standard deviations
 ///   posterior.z_sd, .z_mean      of (found - truth) / deviation, one figure a layer from the seen
 ///                                face; .z_sd_least and .z_sd_most over the layers
+///   posterior.rms_error          of (found - truth)
+///   posterior.bias               mean of z
 ///   posterior.tightening_top2mm  root mean square of the prior's deviation over the posterior's,
 ///                                in the 2 mm behind the seen face; ..._of_shape: with the level's
 ///                                prior left out, how much is learned beyond the mean
+/// each about what was reported and, ", posterior mean", about the posterior's own mean;
+///
 ///   posterior.solves, .seconds   for one right-hand side and channel; all channels
 Result<void> print_posterior(const std::string& name,
                              const Dataset& dataset,

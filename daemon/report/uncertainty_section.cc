@@ -154,8 +154,11 @@ std::string uncertainty_section(const json& reconstruction) {
              "makes of the cells around, not something that was measured.") +
          table_of(told) +
          html::paragraph(
-             "The model's error counts as noise that differs from datum to datum; where it has a "
-             "pattern, the true deviations are larger. Those of each cell are in material.vdb: "
+             "Deviations are about the values reported, which lie beside the most probable ones. "
+             "The "
+             "model's error counts, in part as noise that differs from datum to datum, in part as "
+             "one that is smooth over a picture; where it is larger than model_error, the true "
+             "deviations are larger. Those of each cell are in material.vdb: "
              "absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd.");
 }
 

@@ -51,13 +51,9 @@ MatrixXd prior_covariance(const Block& b, const PriorOptions& prior, double leng
   return sum;
 }
 
-/// (C^-1 + J^T J)^-1 over all cells, columns of J one by one: (log kappa, log sigma_a).
-MatrixXd posterior_covariance(const ChannelProblem& problem,
-                              const ChannelCoefficients& c,
-                              const PosteriorOptions& options) {
-  testing_support::DirectSolver solver;
-  Tangent tangent = *Tangent::at(problem, solver, c, 1e-12, {});
-  const auto cells = static_cast<Index>(problem.block.cell_count());
+/// J over all cells, column by column: (log kappa, log sigma_a); sqrt(w) L.
+MatrixXd jacobian(Tangent& tangent, const ChannelCoefficients& c) {
+  const auto cells = static_cast<Index>(c.absorption.size());
   MatrixXd j(static_cast<Index>(tangent.data_count()), 2 * cells);
   for (Index i = 0; i < cells; ++i) {
     const double absorbed = c.absorption[i];
@@ -73,6 +69,77 @@ MatrixXd posterior_covariance(const ChannelProblem& problem,
       j(d, cells + i) = by_absorption[d];
     }
   }
+  return j;
+}
+
+double along(const Block& b, int axis) { return b.cells()[axis] * b.spacing()[axis]; }
+
+// 1 + eps^2 E E^T of DiscrepancyShapes, datum by datum: half waves no shorter than the block is thick.
+MatrixXd data_covariance(const ChannelProblem& problem, double discrepancy) {
+  const Block& b = problem.block;
+  const Face seen = problem.seen_face;
+  const int width = b.face_width(seen);
+  const int height = b.face_height(seen);
+  const int axis = axis_of(seen);
+  const double thick = along(b, axis);
+  const int nu = std::min(width, 1 + static_cast<int>(along(b, axis == 0 ? 1 : 0) / thick + 1e-9));
+  const int nv = std::min(height, 1 + static_cast<int>(along(b, axis == 2 ? 1 : 2) / thick + 1e-9));
+  const auto data = static_cast<Index>(problem.illuminations.size()) * width * height;
+  const auto wave = [](int k, int i, int n) {
+    return (k == 0 ? 1.0 : std::sqrt(2.0)) *
+           std::cos(std::numbers::pi * k * (2 * i + 1) / (2.0 * n));
+  };
+  Eigen::VectorXd scale(data);
+  for (std::size_t m = 0; m < problem.illuminations.size(); ++m) {
+    const auto& [q, radiance, weight, noise] = problem.illuminations[m];
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t x = 0; x < weight.size(); ++x) {
+      sum += weight[x] > 0.0 ? radiance[x] * radiance[x] : 0.0;
+      count += weight[x] > 0.0 ? 1.0 : 0.0;
+    }
+    for (std::size_t x = 0; x < weight.size(); ++x)
+      scale[static_cast<Index>(m * weight.size() + x)] =
+          std::sqrt(weight[x] * (radiance[x] * radiance[x] + sum / count));
+  }
+  MatrixXd r = MatrixXd::Identity(data, data);
+  const int pixels = width * height;
+  for (Index d = 0; d < data; ++d)
+    for (Index e = 0; e < data; ++e) {
+      const int x = static_cast<int>(d % pixels);
+      const int y = static_cast<int>(e % pixels);
+      double alike = 0.0;
+      for (int u = 0; u < nu; ++u)
+        for (int v = 0; v < nv; ++v)
+          alike += wave(u, x % width, width) * wave(u, y % width, width) *
+                   wave(v, x / width, height) * wave(v, y / width, height) / (nu * nv);
+      const double share = d / pixels == e / pixels ? 1.0 : 0.25;
+      r(d, e) += discrepancy * discrepancy * share * scale[d] * scale[e] * alike;
+    }
+  return r;
+}
+
+struct Gaussian {
+  MatrixXd covariance;
+  Eigen::VectorXd shift;  // of the mean, from the estimate
+};
+
+/// Of (log kappa, log sigma_a) of all cells given the data, the prior about each one's mean.
+Gaussian conditional(const ChannelProblem& problem,
+                     const ChannelCoefficients& c,
+                     const PosteriorOptions& options) {
+  testing_support::DirectSolver solver;
+  Tangent tangent = *Tangent::at(problem, solver, c, 1e-12, {});
+  const MatrixXd j = jacobian(tangent, c);
+  const auto residual = tangent.residual();
+  const auto cells = static_cast<Index>(problem.block.cell_count());
+  Eigen::VectorXd from_mean(2 * cells);
+  for (Index i = 0; i < cells; ++i) {
+    from_mean[i] = -std::log(c.absorption[i] + c.reduced_scattering[i]);
+    from_mean[cells + i] = std::log(c.absorption[i]);
+  }
+  from_mean.head(cells).array() -= from_mean.head(cells).mean();
+  from_mean.tail(cells).array() -= from_mean.tail(cells).mean();
   MatrixXd prior = MatrixXd::Zero(2 * cells, 2 * cells);
   prior.topLeftCorner(cells, cells) =
       prior_covariance(problem.block, options.diffusion, options.length_mm);
@@ -80,8 +147,10 @@ MatrixXd posterior_covariance(const ChannelProblem& problem,
       prior_covariance(problem.block, options.absorption, options.length_mm);
   const MatrixXd gain =
       prior * j.transpose() *
-      (MatrixXd::Identity(j.rows(), j.rows()) + j * prior * j.transpose()).inverse();
-  return prior - gain * j * prior;
+      (data_covariance(problem, options.discrepancy) + j * prior * j.transpose()).inverse();
+  const Eigen::VectorXd misfit =
+      j * from_mean - Eigen::Map<const Eigen::VectorXd>(residual.data(), j.rows());
+  return {prior - gain * j * prior, gain * misfit - from_mean};
 }
 
 class PosteriorOf : public testing::TestWithParam<Case> {};
@@ -92,26 +161,30 @@ TEST_P(PosteriorOf, IsTheGaussianConditionalWrittenDownInCells) {
   for (auto& i : problem.illuminations)
     for (double& w : i.weight) w *= 1e3;
   const ChannelCoefficients c = random_medium(problem.block.cell_count(), 3);
-  PosteriorOptions options;
-  options.find_amplitude = false;
+  const PosteriorOptions options{.find_amplitude = false, .discrepancy = 0.02};
   testing_support::DirectSolver solver;
   const auto found = posterior(problem, solver, c, options, {});
   ASSERT_TRUE(found) << found.error().message;
-  const MatrixXd expected = posterior_covariance(problem, c, options);
+  const auto [expected, shift] = conditional(problem, c, options);
   const auto cells = static_cast<Index>(problem.block.cell_count());
   double tightest = 1.0;
   for (Index i = 0; i < cells; ++i) {
-    const double k = std::sqrt(expected(i, i));
-    const double a = std::sqrt(expected(cells + i, cells + i));
-    const double by_k = -(c.absorption[i] + c.reduced_scattering[i]) / c.reduced_scattering[i];
-    const double by_a = -c.absorption[i] / c.reduced_scattering[i];
-    const double s = std::sqrt(by_k * by_k * k * k + by_a * by_a * a * a +
-                               2 * by_k * by_a * expected(i, cells + i));
-    EXPECT_NEAR(found->deviation.diffusion[i], k, 1e-6 * k);
-    EXPECT_NEAR(found->deviation.absorption[i], a, 1e-6 * a);
-    EXPECT_NEAR(found->deviation.reduced_scattering[i], s, 1e-6 * s);
-    tightest =
-        std::min(tightest, k / std::hypot(options.diffusion.level, options.diffusion.amplitude));
+    const auto cell = static_cast<std::size_t>(i);
+    EXPECT_NEAR(found->shift.diffusion[cell], shift[i], 1e-6);
+    EXPECT_NEAR(found->shift.absorption[cell], shift[cells + i], 1e-6);
+    const double k = std::hypot(std::sqrt(expected(i, i)), shift[i]);
+    const double a = std::hypot(std::sqrt(expected(cells + i, cells + i)), shift[cells + i]);
+    const double both = expected(i, cells + i) + shift[i] * shift[cells + i];
+    const double by_k =
+        -(c.absorption[cell] + c.reduced_scattering[cell]) / c.reduced_scattering[cell];
+    const double by_a = -c.absorption[cell] / c.reduced_scattering[cell];
+    const double s = std::sqrt(by_k * by_k * k * k + by_a * by_a * a * a + 2 * by_k * by_a * both);
+    EXPECT_NEAR(found->deviation.diffusion[cell], k, 1e-6 * k);
+    EXPECT_NEAR(found->deviation.absorption[cell], a, 1e-6 * a);
+    EXPECT_NEAR(found->deviation.reduced_scattering[cell], s, 1e-6 * s);
+    tightest = std::min(tightest,
+                        std::sqrt(expected(i, i)) /
+                            std::hypot(options.diffusion.level, options.diffusion.amplitude));
   }
   EXPECT_LT(tightest,
             0.5);  // or the pictures would say nothing and the prior would agree with itself
@@ -127,13 +200,38 @@ TEST(Posterior, IsThePriorWhereNothingWasMeasured) {
   testing_support::DirectSolver solver;
   PosteriorOptions options;
   options.find_amplitude = false;
-  const auto found =
-      *posterior(problem, solver, random_medium(problem.block.cell_count(), 3), options, {});
-  for (const double sd : found.deviation.diffusion)
-    EXPECT_NEAR(sd, std::hypot(options.diffusion.level, options.diffusion.amplitude), 1e-9);
-  for (const double sd : found.deviation.absorption)
-    EXPECT_NEAR(sd, std::hypot(options.absorption.level, options.absorption.amplitude), 1e-9);
+  const ChannelCoefficients c = random_medium(problem.block.cell_count(), 3);
+  const auto found = *posterior(problem, solver, c, options, {});
+  double mean = 0.0;
+  for (const double a : c.absorption)
+    mean += std::log(a) / static_cast<double>(c.absorption.size());
+  for (std::size_t i = 0; i < c.absorption.size(); ++i) {
+    const double from_mean = std::log(c.absorption[i]) - mean;
+    EXPECT_NEAR(found.shift.absorption[i], -from_mean, 1e-9);
+    EXPECT_NEAR(found.deviation.absorption[i],
+                std::hypot(options.absorption.level, options.absorption.amplitude, from_mean),
+                1e-9);
+    EXPECT_NEAR(
+        found.deviation.diffusion[i],
+        std::hypot(options.diffusion.level, options.diffusion.amplitude, found.shift.diffusion[i]),
+        1e-9);
+  }
   EXPECT_NEAR(found.determined_diffusion + found.determined_absorption, 0.0, 1e-9);
+}
+
+// Independent noise is averaged out over a picture, a smooth discrepancy is not.
+TEST(Posterior, KnowsLessWhereTheModelErrsSmoothly) {
+  const ChannelProblem problem = random_problem(kBackLit);
+  testing_support::DirectSolver solver;
+  const ChannelCoefficients c = random_medium(problem.block.cell_count(), 3);
+  const auto determined = [&](double discrepancy) {
+    const PosteriorOptions options{.find_amplitude = false, .discrepancy = discrepancy};
+    const auto found = posterior(problem, solver, c, options, {});
+    return found->determined_diffusion + found->determined_absorption;
+  };
+  const double without = determined(0.0);
+  EXPECT_LT(determined(0.1), without);
+  EXPECT_LT(determined(0.3), determined(0.1));
 }
 
 // The evidence is that of a marginal likelihood: fields drawn from amplitudes a factor of three apart are told apart.
