@@ -34,27 +34,33 @@ class IterationClock : public EventSink {
   void progress(const Progress& progress) override {
     const auto iteration = progress.detail.find("iteration");
     if (iteration == progress.detail.end()) return;
-    times_.push_back(std::chrono::duration<double>(clock_.now()).count());
+    times_.push_back(now());
     if (static_cast<int>(times_.size()) > most_) stop_.request_stop();
   }
   Result<void> fact(std::string_view type, const nlohmann::json& /*data*/) override {
-    if (type == "channel.reconstructed") stop_.request_stop();
+    if (type != "channel.reconstructed") return ok();
+    if (channel_seconds_ == 0.0) channel_seconds_ = now() - begun_;
+    stop_.request_stop();
     return ok();
   }
   std::stop_token token() const { return stop_.get_token(); }
   Timing timing() const {
     std::vector<double> steps;
     for (std::size_t i = 1; i < times_.size(); ++i) steps.push_back(times_[i] - times_[i - 1]);
-    if (steps.empty()) return {};
+    if (steps.empty()) return {0.0, 0, channel_seconds_};
     const int count = static_cast<int>(steps.size());
-    return {median(std::move(steps)), count};
+    return {median(std::move(steps)), count, channel_seconds_};
   }
 
  private:
+  double now() const { return std::chrono::duration<double>(clock_.now()).count(); }
+
   int most_;
   const SystemClock clock_;
   std::stop_source stop_;
   std::vector<double> times_;
+  double begun_ = now();
+  double channel_seconds_ = 0.0;
 };
 
 /// n x n regions of the lit face; pictures are still to come.
