@@ -1,8 +1,5 @@
-#include <sys/resource.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -13,6 +10,7 @@
 #include "bench/figure.h"
 #include "bench/render/render_case.h"
 #include "bench/render/sphere_error.h"
+#include "bench/stopwatch.h"
 #include "render/graph/relaxation.h"
 #include "render/mesh/mesh_distance.h"
 #include "render/tetrahedra/stuffing.h"
@@ -36,27 +34,6 @@ constexpr double kTolerance = 1e-3;
 constexpr int kThreads = 2;
 constexpr int kRemembered = 4;
 
-double cpu_seconds() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-class Stopwatch {
- public:
-  double cpu() const { return cpu_seconds() - cpu_start_; }  ///< of all threads
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  double cpu_start_ = cpu_seconds();
-};
-
 void measure_sphere() {
   ThreadTeam team(kThreads);
   const auto sphere = bench::shape("sphere");
@@ -78,7 +55,7 @@ void measure_mesh() {
       render::surface_mesh(bench::cut(*bench::shape("torus"), 1.3e6));
   bench::print_figure(
       "render.mesh_triangles", "torus", static_cast<double>(surface.triangles.size()), "1");
-  const Stopwatch watch;
+  const bench::Stopwatch watch;
   const auto solid = render::MeshDistance::create(surface);
   if (!solid) return opaline::log::error("{}", solid.error().message);
   const render::TetMesh mesh = bench::cut(**solid, 1e5);
@@ -105,7 +82,7 @@ void measure_frame_rate(const render::TetMesh& mesh) {
   std::vector<double> seconds;
   double worst = 0.0;
   for (int f = 1; f < kFrames; ++f) {
-    const Stopwatch watch;
+    const bench::Stopwatch watch;
     const auto summary = object.frame(kStep * f, kTolerance, false);
     seconds.push_back(watch.seconds());
     worst = std::max(worst, summary.relative_residual);
@@ -129,7 +106,7 @@ void measure_warm_starts(const render::TetMesh& mesh) {
   std::vector<double> seconds;
   int iterations = 0;
   for (int f = 1; f <= kFrames; ++f) {
-    const Stopwatch watch;
+    const bench::Stopwatch watch;
     iterations += object.frame(kStep * f, kTolerance, false).iterations;
     seconds.push_back(watch.cpu());
   }
@@ -179,7 +156,7 @@ void measure_published() {
   const auto q = [](const auto& node) { return bench::light_around(node, 0.0)[0]; };
   std::vector<double> seconds;
   for (int round = 0; round < 3; ++round) {
-    const Stopwatch watch;
+    const bench::Stopwatch watch;
     relaxation.solve(q, kSweeps, team);
     seconds.push_back(watch.cpu());
   }
@@ -192,7 +169,7 @@ void measure_published() {
   double spent = 0.0;
   for (const double tolerance :
        {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4}) {  // the best that fits into the time
-    const Stopwatch watch;
+    const bench::Stopwatch watch;
     object.frame(0.0, tolerance, true);
     const double took = watch.cpu();
     if (took > allowed) break;
@@ -214,7 +191,7 @@ void measure_growth() {
     std::vector<double> seconds;
     int iterations = 0;
     for (int round = 0; round < 5; ++round) {
-      const Stopwatch watch;
+      const bench::Stopwatch watch;
       iterations = object.frame(0.0, kTolerance, true).iterations;
       seconds.push_back(watch.cpu());
     }

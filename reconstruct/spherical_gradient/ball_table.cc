@@ -1,0 +1,224 @@
+#include "reconstruct/spherical_gradient/ball_table.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "base/ensure.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+constexpr BallTable::Row kRows[]{
+#include "reconstruct/spherical_gradient/ball_table.inc"
+};
+constexpr int kBendPowers = 4;  // x^1 ... x^4
+constexpr int kIterations = 40;
+
+double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albedo)); }
+double logit(double share) { return std::log(share / (1.0 - share)); }
+double power(double base, std::size_t exponent) {
+  return std::pow(base, static_cast<double>(exponent));
+}
+double share(double logit) { return 1.0 / (1.0 + std::exp(-logit)); }
+
+/// Weighted least squares; chi^2 a degree of freedom with it.
+struct Fit {
+  Eigen::VectorXd coefficients;
+  double misfit;
+};
+Result<Fit> fit(const Eigen::MatrixXd& design, const Eigen::VectorXd& right) {
+  if (design.rows() <= design.cols())
+    return invalid_argument(
+        fmt::format("{} balls for {} coefficients", design.rows(), design.cols()));
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(design);
+  if (factors.rank() < design.cols())
+    return invalid_argument(
+        "the balls do not determine the table's fit: more albedos or curvatures");
+  Eigen::VectorXd found = factors.solve(right);
+  const double chi_squared = (design * found - right).squaredNorm();
+  return Fit{std::move(found), chi_squared / static_cast<double>(design.rows() - design.cols())};
+}
+
+/// Root mean square of the relative deviations of r, flat surfaces only.
+double flat_deviation(std::span<const BallTable::Row> rows) {
+  double sum = 0.0;
+  int count = 0;
+  for (const BallTable::Row& row : rows) {
+    if (row.curvature > 0.0) continue;
+    sum += std::pow(row.ratio_deviation / row.ratio, 2);
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0.0;
+}
+
+/// sum c_i u^i and its derivative.
+template <std::size_t N>
+std::pair<double, double> polynomial(const std::array<double, N>& c, double u) {
+  double value = 0.0;
+  double slope = 0.0;
+  for (std::size_t i = N; i-- > 0;) {
+    slope = slope * u + value;
+    value = value * u + c[i];
+  }
+  return {value, slope};
+}
+
+}  // namespace
+
+Result<BallTable> BallTable::make(std::span<const Row> rows) {
+  BallTable table;
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  const auto bends = static_cast<Eigen::Index>(table.bend_.size());
+  const auto brights = static_cast<Eigen::Index>(table.bright_.size());
+  Eigen::MatrixXd bend(count, kFlat + bends * kBend);
+  Eigen::MatrixXd bright(count, brights * kBright);
+  Eigen::VectorXd log_ratios(count);
+  Eigen::VectorXd logits(count);
+  table.least_u_ = HUGE_VAL;
+  table.most_u_ = -HUGE_VAL;
+  for (Eigen::Index n = 0; n < count; ++n) {
+    const Row& row = rows[static_cast<std::size_t>(n)];
+    const double g = decay(row.reduced_albedo);
+    const double u = std::log(g);
+    const double ratio_weight = row.ratio / row.ratio_deviation;
+    const double logit_weight =
+        row.reflectance * (1.0 - row.reflectance) / row.reflectance_deviation;
+    log_ratios[n] = ratio_weight * std::log(row.ratio);
+    logits[n] = logit_weight * logit(row.reflectance);
+    Eigen::Index at = 0;
+    for (std::size_t i = 0; i < kFlat; ++i) bend(n, at++) = ratio_weight * power(g, i);
+    for (std::size_t j = 1; j <= table.bend_.size(); ++j)
+      for (std::size_t i = 0; i < kBend; ++i)
+        bend(n, at++) = ratio_weight * power(row.curvature, j) * power(g, i + 1);
+    at = 0;
+    for (std::size_t j = 0; j < table.bright_.size(); ++j)
+      for (std::size_t i = 0; i < kBright; ++i)
+        bright(n, at++) = logit_weight * power(row.curvature, j) * power(g, i);
+    table.least_u_ = std::min(table.least_u_, u);
+    table.most_u_ = std::max(table.most_u_, u);
+    table.most_x_ = std::max(table.most_x_, row.curvature);
+  }
+  const Result<Fit> ratios = fit(bend, log_ratios);
+  if (!ratios) return ratios.error();
+  const Result<Fit> reflectances = fit(bright, logits);
+  if (!reflectances) return reflectances.error();
+  Eigen::Index at = 0;
+  for (double& c : table.flat_) c = ratios->coefficients[at++];
+  for (auto& power : table.bend_)
+    for (double& c : power) c = ratios->coefficients[at++];
+  at = 0;
+  for (auto& power : table.bright_)
+    for (double& c : power) c = reflectances->coefficients[at++];
+  table.ratio_misfit_ = ratios->misfit;
+  table.ratio_deviation_ = flat_deviation(rows) *
+                           std::sqrt(static_cast<double>(bend.cols()) / static_cast<double>(count));
+  table.reflectance_misfit_ = reflectances->misfit;
+  return table;
+}
+
+std::span<const BallTable::Row> BallTable::standard_rows() { return kRows; }
+
+const BallTable& BallTable::standard() {
+  static const BallTable table = [] {
+    Result<BallTable> made = make(kRows);
+    ENSURE(made);
+    return *std::move(made);
+  }();
+  return table;
+}
+
+BallTable::Value BallTable::log_ratio(double u, double x) const {
+  const double g = std::exp(u);
+  const auto [flat, flat_slope] = polynomial(flat_, g);
+  Value bent{0.0, 0.0, 0.0};
+  for (std::size_t j = bend_.size(); j-- > 0;) {
+    const auto [f, slope] = polynomial(bend_[j], g);
+    bent.by_x = bent.by_x * x + static_cast<double>(j + 1) * f;
+    bent.value = bent.value * x + f;
+    bent.by_u = bent.by_u * x + slope;
+  }
+  bent.value *= x;
+  bent.by_u *= x;
+  return {flat + g * bent.value, g * (flat_slope + bent.value + g * bent.by_u), g * bent.by_x};
+}
+
+BallTable::Value BallTable::logit_reflectance(double u, double x) const {
+  const double g = std::exp(u);
+  Value sum{0.0, 0.0, 0.0};
+  for (std::size_t j = bright_.size(); j-- > 0;) {
+    const auto [h, slope] = polynomial(bright_[j], g);
+    sum.by_x = sum.by_x * x + sum.value;
+    sum.value = sum.value * x + h;
+    sum.by_u = sum.by_u * x + slope;
+  }
+  return {sum.value, g * sum.by_u, sum.by_x};
+}
+
+BallTable::Light BallTable::light(double reduced_albedo, double curvature) const {
+  const double u = std::log(decay(reduced_albedo));
+  return {share(logit_reflectance(u, curvature).value), std::exp(log_ratio(u, curvature).value)};
+}
+
+double BallTable::decay_of(double reflectance, double curvature) const {
+  const double wanted = logit(reflectance);
+  double low = least_u_;
+  double high = most_u_;
+  double u = 0.5 * (low + high);
+  for (int n = 0; n < kIterations; ++n) {
+    const Value at = logit_reflectance(u, curvature);
+    (at.value > wanted ? low : high) = u;  // it falls with u
+    const double newton = u - (at.value - wanted) / at.by_u;
+    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+    if (std::abs(next - u) < 1e-12) break;
+    u = next;
+  }
+  return u;
+}
+
+double BallTable::flat_ratio(double reflectance) const {
+  return std::exp(log_ratio(decay_of(std::clamp(reflectance, 1e-6, 1.0 - 1e-6), 0.0), 0.0).value);
+}
+
+BallTable::Found BallTable::find(double reflectance, double ratio) const {
+  if (!(reflectance > 0.0 && reflectance < 1.0 && ratio > 0.0 && std::isfinite(ratio))) return {};
+  const double wanted_ratio = std::log(ratio);
+  const double wanted_logit = logit(reflectance);
+  if (wanted_logit > logit_reflectance(least_u_, most_x_).value) return {.end = End::kTooBright};
+  if (wanted_logit < logit_reflectance(most_u_, 0.0).value) return {.end = End::kTooDark};
+  double u = decay_of(reflectance, 0.0);
+  const Value start = log_ratio(u, 0.0);
+  double x = std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_);
+  Value r{};
+  Value b{};
+  for (int n = 0; n < kIterations; ++n) {
+    r = log_ratio(u, x);
+    b = logit_reflectance(u, x);
+    const double det = r.by_u * b.by_x - r.by_x * b.by_u;
+    const double off_r = wanted_ratio - r.value;
+    const double off_b = wanted_logit - b.value;
+    const double step_u = std::clamp((off_r * b.by_x - off_b * r.by_x) / det, -0.5, 0.5);
+    const double step_x = std::clamp((off_b * r.by_u - off_r * b.by_u) / det, -0.1, 0.1);
+    u = std::clamp(u + step_u, least_u_ - 0.2, most_u_ + 0.1);
+    x = std::clamp(x + step_x, -0.02, 1.1 * most_x_);
+    if (std::abs(step_u) + std::abs(step_x) < 1e-10) break;
+  }
+  if (u < least_u_) return {.end = End::kTooBright};
+  if (u > most_u_) return {.end = End::kTooDark};
+  if (!(x > 0.0)) return {.end = End::kFlat};
+  if (x > most_x_) return {.end = End::kTooTranslucent};
+  const double det = r.by_u * b.by_x - r.by_x * b.by_u;
+  const double by_logit = 1.0 / (reflectance * (1.0 - reflectance));
+  const double g = std::exp(u);
+  return Found{End::kFound,
+               1.0 - g * g / 3.0,
+               x,
+               {-r.by_x / det * by_logit,
+                b.by_x / det / ratio,
+                r.by_u / det / x * by_logit,
+                -b.by_u / det / x / ratio}};
+}
+
+}  // namespace opaline::reconstruct

@@ -1,0 +1,275 @@
+#include "reconstruct/spherical_gradient/scattering_maps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/spherical_gradient/window_fit.h"
+
+namespace opaline::reconstruct {
+namespace {
+
+/// What interpolation in the table adds to ln D: the error on balls that are not in it
+/// (tests/reconstruct/spherical_gradient/ball_table_test.cc).
+constexpr double kTableDeviation = 0.02;
+
+Result<void> check(const GradientPictures& p, const MapOptions& options) {
+  if (p.width < 1 || p.height < 1)
+    return invalid_argument(fmt::format("pictures of {} x {} pixels", p.width, p.height));
+  const auto count = static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height);
+  for (std::size_t n = 0; n < p.radiance.size(); ++n)
+    if (p.radiance[n].size() != count || p.variance[n].size() != count)
+      return invalid_argument(fmt::format("picture {} has {} values and {} variances for {} pixels",
+                                          n,
+                                          p.radiance[n].size(),
+                                          p.variance[n].size(),
+                                          count));
+  if (p.measured.size() != count)
+    return invalid_argument(fmt::format("a mask of {} for {} pixels", p.measured.size(), count));
+  if (!(p.pixel_mm > 0.0 && std::isfinite(p.pixel_mm)))
+    return invalid_argument(fmt::format("pixels of {} mm; expected > 0", p.pixel_mm));
+  if (!(p.white > 0.0 && std::isfinite(p.white)))
+    return invalid_argument(fmt::format("white of {}; expected > 0", p.white));
+  if (options.half_windows.empty() ||
+      !std::is_sorted(options.half_windows.begin(), options.half_windows.end()) ||
+      options.half_windows.front() < 1 || options.half_windows.back() > 1000)
+    return invalid_argument("half windows; expected 1 to 1000 pixels, in rising order");
+  if (!(options.certain > 0.0 && options.sigmas >= 0.0))
+    return invalid_argument("certainty and sigmas; expected > 0");
+  return ok();
+}
+
+ScatteringMaps empty_maps(int width, int height) {
+  ScatteringMaps maps;
+  maps.width = width;
+  maps.height = height;
+  const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  for (auto* map : {&maps.normal_x,
+                    &maps.normal_y,
+                    &maps.normal_z,
+                    &maps.curvature,
+                    &maps.reduced_albedo,
+                    &maps.diffusion,
+                    &maps.translucency,
+                    &maps.reduced_scattering,
+                    &maps.absorption,
+                    &maps.log_diffusion_deviation,
+                    &maps.albedo_deviation})
+    map->assign(count, 0.0F);
+  maps.left_out.assign(count, LeftOut::kNotMeasured);
+  return maps;
+}
+
+/// r = C S^(-1/2) of one pixel, S = sum L_i^2 less what noise adds to it, L_i = 2 P_i - C; to second order without the bias that noise
+/// gives to it, 3/8 var(S)/S^2 and the covariance of C with S.
+struct PixelRatio {
+  std::array<double, 3> gradient{};
+  double square = 0.0;             ///< S; nothing below is set where it is not above 0
+  double gradient_variance = 0.0;  ///< sum of the components'
+  double ratio = 0.0;
+  double variance = 0.0;
+};
+
+PixelRatio ratio_of(const GradientPictures& p, std::size_t at) {
+  PixelRatio r;
+  const double constant = p.radiance[0][at];
+  const double constant_variance = p.variance[0][at];
+  for (std::size_t n = 0; n < 3; ++n) {
+    r.gradient[n] = 2.0 * p.radiance[n + 1][at] - constant;
+    r.square += r.gradient[n] * r.gradient[n];
+    r.gradient_variance += 4.0 * p.variance[n + 1][at] + constant_variance;
+  }
+  r.square -= r.gradient_variance;
+  if (!(r.square > 0.0)) return r;
+  const double root = std::sqrt(r.square);
+  const double tilt = (r.gradient[0] + r.gradient[1] + r.gradient[2]) / root;
+  const double by_constant = (1.0 + constant * tilt / root) / root;
+  r.variance = by_constant * by_constant * constant_variance;
+  double along = tilt * tilt * constant_variance;  // variance of L's length
+  for (std::size_t n = 0; n < 3; ++n) {
+    const double cosine = r.gradient[n] / root;
+    const double by_gradient = 2.0 * constant * cosine / r.square;
+    r.variance += by_gradient * by_gradient * p.variance[n + 1][at];
+    along += 4.0 * cosine * cosine * p.variance[n + 1][at];
+  }
+  const double bias = 1.5 * along / r.square + tilt * constant_variance / (constant * root);
+  r.ratio = constant / root * (1.0 - bias);
+  return r;
+}
+
+void measure_pixel(const GradientPictures& p,
+                   std::size_t at,
+                   PixelValues& values,
+                   ScatteringMaps& maps) {
+  if (p.measured[at] == 0 || !(p.radiance[0][at] > 0.0F)) return;
+  const PixelRatio r = ratio_of(p, at);
+  if (!(r.square > 0.0)) return;
+  const double length = std::hypot(r.gradient[0], r.gradient[1], r.gradient[2]);
+  maps.normal_x[at] = static_cast<float>(r.gradient[0] / length);
+  maps.normal_y[at] = static_cast<float>(r.gradient[1] / length);
+  maps.normal_z[at] = static_cast<float>(r.gradient[2] / length);
+  values.normal_x[at] = maps.normal_x[at];
+  values.normal_y[at] = maps.normal_y[at];
+  values.normal_variance[at] = static_cast<float>(r.gradient_variance / 3.0 / r.square);
+  values.ratio[at] = static_cast<float>(r.ratio);
+  values.ratio_variance[at] = static_cast<float>(r.variance);
+  values.reflectance[at] = static_cast<float>(p.radiance[0][at] / p.white);
+  values.reflectance_variance[at] = static_cast<float>(p.variance[0][at] / (p.white * p.white));
+  values.measured[at] = 1;
+}
+
+/// Ratios of flat surfaces, looked up by reflectance.
+class FlatRatios {
+ public:
+  explicit FlatRatios(const BallTable& table) {
+    for (std::size_t n = 0; n < ratios_.size(); ++n)
+      ratios_[n] = table.flat_ratio(static_cast<double>(n) / kSteps);
+  }
+  double at(double reflectance) const {
+    const double place = std::clamp(reflectance, 0.0, 1.0) * kSteps;
+    const auto n = std::min(static_cast<std::size_t>(place), ratios_.size() - 2);
+    const double part = place - static_cast<double>(n);
+    return (1.0 - part) * ratios_[n] + part * ratios_[n + 1];
+  }
+
+ private:
+  static constexpr int kSteps = 256;
+  std::array<double, kSteps + 1> ratios_{};
+};
+
+bool is_certain(const WindowValues& w, double flat, double certain) {
+  const double beyond = w.ratio - flat;
+  return w.count >= 6 && w.curvature > 0.0 && beyond > 0.0 &&
+         w.curvature_variance < certain * certain * w.curvature * w.curvature &&
+         w.ratio_variance < certain * certain * beyond * beyond;
+}
+
+/// The smallest window of every pixel that is certain enough, or the largest one.
+std::vector<WindowValues> choose_windows(const PixelValues& values,
+                                         const FlatRatios& flat,
+                                         const MapOptions& options,
+                                         ThreadTeam& team) {
+  std::vector<WindowValues> chosen(values.measured.size());
+  std::vector<std::uint8_t> done(values.measured.size(), 0);
+  for (const int half : options.half_windows)
+    for_each_window(values, half, team, [&](int x, int y, const WindowValues& window) {
+      const std::size_t at = values.index(x, y);
+      if (done[at] != 0) return;
+      chosen[at] = window;
+      done[at] = is_certain(window, flat.at(window.reflectance), options.certain) ? 1 : 0;
+    });
+  return chosen;
+}
+
+/// Variance of a ratio against the table's flat one.
+double ratio_variance(const WindowValues& w, const BallTable& table) {
+  const double of_table = table.ratio_deviation() * w.ratio;
+  return w.ratio_variance + of_table * of_table;
+}
+
+LeftOut judge(const WindowValues& w, double flat, double variance, double sigmas) {
+  if (w.count < 6) return LeftOut::kNotMeasured;
+  const double uncertain = sigmas * std::sqrt(w.curvature_variance);
+  if (w.curvature < -uncertain) return LeftOut::kConcave;
+  if (w.curvature <= uncertain) return LeftOut::kTooFlat;
+  if (w.ratio - flat <= sigmas * std::sqrt(variance)) return LeftOut::kBelowNoise;
+  return LeftOut::kFound;
+}
+
+LeftOut reason_of(BallTable::End end) {
+  switch (end) {
+    case BallTable::End::kFound:
+      return LeftOut::kFound;
+    case BallTable::End::kFlat:
+      return LeftOut::kBelowNoise;
+    case BallTable::End::kTooTranslucent:
+      return LeftOut::kTooTranslucent;
+    default:
+      return LeftOut::kBeyondTable;
+  }
+}
+
+void estimate_pixel(const WindowValues& w,
+                    double pixel_mm,
+                    const BallTable& table,
+                    std::size_t at,
+                    ScatteringMaps& maps) {
+  const BallTable::Found found = table.find(w.reflectance, w.ratio);
+  maps.left_out[at] = reason_of(found.end);
+  if (found.end != BallTable::End::kFound) return;
+  const double curvature = w.curvature / pixel_mm;
+  const double g = std::sqrt(3.0 * (1.0 - found.reduced_albedo));
+  const double translucency = found.curvature / curvature;
+  const double diffusion = g * translucency / 3.0;
+  const auto& s = found.sensitivity;
+  const double by_reflectance = s[0] + s[2];
+  const double by_ratio = s[1] + s[3];
+  const double log_variance = by_reflectance * by_reflectance * w.reflectance_variance +
+                              by_ratio * by_ratio * ratio_variance(w, table) +
+                              w.curvature_variance / (w.curvature * w.curvature) +
+                              kTableDeviation * kTableDeviation;
+  const double decay_variance =
+      s[0] * s[0] * w.reflectance_variance + s[1] * s[1] * ratio_variance(w, table);
+  maps.reduced_albedo[at] = static_cast<float>(found.reduced_albedo);
+  maps.diffusion[at] = static_cast<float>(diffusion);
+  maps.translucency[at] = static_cast<float>(translucency);
+  maps.reduced_scattering[at] = static_cast<float>(found.reduced_albedo / (3.0 * diffusion));
+  maps.absorption[at] = static_cast<float>((1.0 - found.reduced_albedo) / (3.0 * diffusion));
+  maps.log_diffusion_deviation[at] = static_cast<float>(std::sqrt(log_variance));
+  maps.albedo_deviation[at] =  // d alpha' = -2/3 g^2 d ln g
+      static_cast<float>(2.0 / 3.0 * g * g * std::sqrt(decay_variance));
+}
+
+}  // namespace
+
+std::string_view to_string(LeftOut reason) {
+  switch (reason) {
+    case LeftOut::kFound:
+      return "found";
+    case LeftOut::kNotMeasured:
+      return "not measured";
+    case LeftOut::kTooFlat:
+      return "too flat";
+    case LeftOut::kConcave:
+      return "concave";
+    case LeftOut::kBelowNoise:
+      return "below the noise";
+    case LeftOut::kTooTranslucent:
+      return "too translucent for its curvature";
+    case LeftOut::kBeyondTable:
+      return "beyond the table";
+  }
+  return "unknown";
+}
+
+Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
+                                           const BallTable& table,
+                                           const MapOptions& options,
+                                           ThreadTeam& team) {
+  if (Result<void> good = check(pictures, options); !good) return good.error();
+  ScatteringMaps maps = empty_maps(pictures.width, pictures.height);
+  PixelValues values(pictures.width, pictures.height);
+  const std::size_t count = values.measured.size();
+  const auto share = [&](int thread) { return count * thread / team.size(); };
+  team.run([&](int thread) {
+    for (std::size_t at = share(thread); at < share(thread + 1); ++at)
+      measure_pixel(pictures, at, values, maps);
+  });
+  const FlatRatios flat(table);
+  const std::vector<WindowValues> windows = choose_windows(values, flat, options, team);
+  team.run([&](int thread) {
+    for (std::size_t at = share(thread); at < share(thread + 1); ++at) {
+      const WindowValues& window = windows[at];
+      if (values.measured[at] == 0 || window.count < 6) continue;
+      maps.curvature[at] = static_cast<float>(window.curvature / pictures.pixel_mm);
+      maps.left_out[at] =
+          judge(window, flat.at(window.reflectance), ratio_variance(window, table), options.sigmas);
+      if (maps.left_out[at] == LeftOut::kFound)
+        estimate_pixel(window, pictures.pixel_mm, table, at, maps);
+    }
+  });
+  return maps;
+}
+
+}  // namespace opaline::reconstruct

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "base/thread_team.h"
+#include "reconstruct/spherical_gradient/ball_table.h"
+
+namespace opaline::reconstruct {
+
+/// One channel of four cross-polarised pictures of an object among lights, seen along z by an orthographic camera: constant light, and the
+/// gradients (1 + omega_x)/2, (1 + omega_y)/2, (1 + omega_z)/2, omega the direction to the light. y points down the picture's rows.
+struct GradientPictures {
+  int width = 0;
+  int height = 0;
+  double pixel_mm = 0.1;
+  double white =
+      1.0;  ///< what a surface that gives back all of the light shows under constant light
+  std::array<std::vector<float>, 4> radiance;
+  std::array<std::vector<float>, 4> variance;
+  std::vector<std::uint8_t> measured;  ///< 0: outside the object, saturated, shadowed
+};
+
+/// Why a pixel has no answer.
+enum class LeftOut : std::uint8_t {
+  kFound,           ///< it has one
+  kNotMeasured,     ///< as the pictures say, or without light
+  kTooFlat,         ///< its curvature is not certainly above zero
+  kConcave,         ///< its curvature is certainly below zero
+  kBelowNoise,      ///< its ratio is not certainly above that of a flat surface
+  kTooTranslucent,  ///< for its curvature
+  kBeyondTable,     ///< brighter or darker than what was traced
+};
+std::string_view to_string(LeftOut reason);  ///< "found", "not measured", "too flat", ...
+
+struct MapOptions {
+  std::vector<int> half_windows{
+      2, 4, 8, 16, 32};  ///< pixels; the smallest that is certain enough is taken
+  double certain =
+      0.05;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
+  double sigmas = 2.0;  ///< of what is called certain in LeftOut
+};
+
+struct ScatteringMaps {
+  int width = 0;
+  int height = 0;
+  std::vector<float> normal_x, normal_y, normal_z;  ///< of each pixel, not smoothed
+  std::vector<float> curvature;                     ///< mean, 1/mm; > 0 where the object bulges
+  std::vector<float> reduced_albedo;
+  std::vector<float> diffusion;           ///< D = 1/(3 sigma_t'), mm
+  std::vector<float> translucency;        ///< l_d = 1/sigma_tr, mm
+  std::vector<float> reduced_scattering;  ///< sigma_s', 1/mm
+  std::vector<float> absorption;          ///< sigma_a, 1/mm
+  std::vector<float>
+      log_diffusion_deviation;  ///< standard deviation of ln D: noise and the table's own
+  std::vector<float> albedo_deviation;
+  std::vector<LeftOut> left_out;  ///< where not kFound, the maps from reduced_albedo on hold 0
+};
+
+/// Scattering parameters of every pixel (Zhu et al. 2013, by traced balls instead of the dipole: ball_table.h). Normals after Ma et al. 2007, from
+/// the pictures with half of the constant one taken away; noise of the pictures is carried to the results.
+///
+/// Errors: kInvalidArgument where sizes or numbers do not fit.
+Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
+                                           const BallTable& table,
+                                           const MapOptions& options,
+                                           ThreadTeam& team);
+
+}  // namespace opaline::reconstruct

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "base/thread_team.h"
+
+namespace opaline::reconstruct {
+
+/// What every pixel of an orthographic picture says by itself: the normal across the line of sight, the ratio r and the reflectance.
+struct PixelValues {
+  int width = 0;
+  int height = 0;
+  std::vector<float> normal_x;
+  std::vector<float> normal_y;
+  std::vector<float> normal_variance;  ///< of one component
+  std::vector<float> ratio;
+  std::vector<float> ratio_variance;
+  std::vector<float> reflectance;
+  std::vector<float> reflectance_variance;
+  std::vector<std::uint8_t> measured;  ///< the others are left out of every sum
+
+  PixelValues(int w, int h);
+  std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * width + x; }
+};
+
+/// The same in a square window around a pixel, each a mean of its n pixels but the curvature: the normals' divergence, from planes fitted
+/// to n_x and n_y,
+///
+///   2 H = d n_x/dx + d n_y/dy      (for a graph z(x, y) with n = (-z_x, -z_y, 1)/W, exactly; 1/R on a ball)
+///
+/// so a ball's curvature is found without bias in windows of any size.
+struct WindowValues {
+  int count = 0;           ///< measured pixels; nothing else is set below six of them
+  double curvature = 0.0;  ///< H, 1/pixel
+  double curvature_variance = 0.0;
+  double ratio = 0.0;
+  double ratio_variance = 0.0;
+  double reflectance = 0.0;
+  double reflectance_variance = 0.0;
+};
+
+/// Calls f(x, y, window) for the measured pixels of all rows, from several threads; `half` pixels on either side, clipped at the picture's edge. Sums
+/// slide, so the time does not depend on the window.
+void for_each_window(const PixelValues& pixels,
+                     int half,
+                     ThreadTeam& team,
+                     const std::function<void(int x, int y, const WindowValues& window)>& f);
+
+}  // namespace opaline::reconstruct
