@@ -190,6 +190,7 @@ BallTable::Found BallTable::find(double reflectance, double ratio) const {
   if (wanted_logit < logit_reflectance(most_u_, 0.0).value) return {.end = End::kTooDark};
   double u = decay_of(reflectance, 0.0);
   const Value start = log_ratio(u, 0.0);
+  if (wanted_ratio <= start.value) return {.end = End::kFlat};
   double x = std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_);
   Value r{};
   Value b{};
