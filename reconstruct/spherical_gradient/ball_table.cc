@@ -16,6 +16,7 @@ constexpr BallTable::Row kRows[]{
 };
 constexpr int kBendPowers = 4;  // x^1 ... x^4
 constexpr int kIterations = 40;
+constexpr double kArrived = 1e-9;  // quadratic: the next step would be nothing
 
 double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albedo)); }
 double logit(double share) { return std::log(share / (1.0 - share)); }
@@ -182,44 +183,66 @@ double BallTable::flat_ratio(double reflectance) const {
   return std::exp(log_ratio(decay_of(std::clamp(reflectance, 1e-6, 1.0 - 1e-6), 0.0), 0.0).value);
 }
 
+/// Newton's iteration, kept within reach of the table; whether it arrived.
+bool BallTable::search(double wanted_ratio, double wanted_logit, int steps, Place& at) const {
+  for (int n = 0; n < steps; ++n) {
+    const Value r = log_ratio(at.u, at.x);
+    const Value b = logit_reflectance(at.u, at.x);
+    const double det = r.by_u * b.by_x - r.by_x * b.by_u;
+    const double off_r = wanted_ratio - r.value;
+    const double off_b = wanted_logit - b.value;
+    const double step_u = std::clamp((off_r * b.by_x - off_b * r.by_x) / det, -0.5, 0.5);
+    const double step_x = std::clamp((off_b * r.by_u - off_r * b.by_u) / det, -0.1, 0.1);
+    at.u = std::clamp(at.u + step_u, least_u_ - 0.2, most_u_ + 0.1);
+    at.x = std::clamp(at.x + step_x, -0.02, 1.1 * most_x_);
+    if (std::abs(step_u) + std::abs(step_x) < kArrived) return true;
+  }
+  return false;
+}
+
+BallTable::Found BallTable::found(double reflectance, double ratio, const Place& at) const {
+  if (at.u < least_u_) return {.end = End::kTooBright};
+  if (at.u > most_u_) return {.end = End::kTooDark};
+  if (!(at.x > 0.0)) return {.end = End::kFlat};
+  if (at.x > most_x_) return {.end = End::kTooTranslucent};
+  const Value r = log_ratio(at.u, at.x);
+  const Value b = logit_reflectance(at.u, at.x);
+  const double det = r.by_u * b.by_x - r.by_x * b.by_u;
+  const double by_logit = 1.0 / (reflectance * (1.0 - reflectance));
+  const double g = std::exp(at.u);
+  return Found{End::kFound,
+               1.0 - g * g / 3.0,
+               at.x,
+               {-r.by_x / det * by_logit,
+                b.by_x / det / ratio,
+                r.by_u / det / at.x * by_logit,
+                -b.by_u / det / at.x / ratio}};
+}
+
 BallTable::Found BallTable::find(double reflectance, double ratio) const {
   if (!(reflectance > 0.0 && reflectance < 1.0 && ratio > 0.0 && std::isfinite(ratio))) return {};
   const double wanted_ratio = std::log(ratio);
   const double wanted_logit = logit(reflectance);
   if (wanted_logit > logit_reflectance(least_u_, most_x_).value) return {.end = End::kTooBright};
   if (wanted_logit < logit_reflectance(most_u_, 0.0).value) return {.end = End::kTooDark};
-  double u = decay_of(reflectance, 0.0);
+  const double u = decay_of(reflectance, 0.0);
   const Value start = log_ratio(u, 0.0);
   if (wanted_ratio <= start.value) return {.end = End::kFlat};
-  double x = std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_);
-  Value r{};
-  Value b{};
-  for (int n = 0; n < kIterations; ++n) {
-    r = log_ratio(u, x);
-    b = logit_reflectance(u, x);
-    const double det = r.by_u * b.by_x - r.by_x * b.by_u;
-    const double off_r = wanted_ratio - r.value;
-    const double off_b = wanted_logit - b.value;
-    const double step_u = std::clamp((off_r * b.by_x - off_b * r.by_x) / det, -0.5, 0.5);
-    const double step_x = std::clamp((off_b * r.by_u - off_r * b.by_u) / det, -0.1, 0.1);
-    u = std::clamp(u + step_u, least_u_ - 0.2, most_u_ + 0.1);
-    x = std::clamp(x + step_x, -0.02, 1.1 * most_x_);
-    if (std::abs(step_u) + std::abs(step_x) < 1e-10) break;
+  Place at{u, std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_)};
+  search(wanted_ratio, wanted_logit, kIterations, at);
+  return found(reflectance, ratio, at);
+}
+
+BallTable::Found BallTable::find(double reflectance, double ratio, const Found& near) const {
+  constexpr int kSteps = 6;
+  if (near.end == End::kFound && reflectance > 0.0 && reflectance < 1.0 && ratio > 0.0) {
+    Place at{0.5 * std::log(3.0 * (1.0 - near.reduced_albedo)), near.curvature};
+    if (search(std::log(ratio), logit(reflectance), kSteps, at)) {
+      const Found answer = found(reflectance, ratio, at);
+      if (answer.end == End::kFound) return answer;
+    }
   }
-  if (u < least_u_) return {.end = End::kTooBright};
-  if (u > most_u_) return {.end = End::kTooDark};
-  if (!(x > 0.0)) return {.end = End::kFlat};
-  if (x > most_x_) return {.end = End::kTooTranslucent};
-  const double det = r.by_u * b.by_x - r.by_x * b.by_u;
-  const double by_logit = 1.0 / (reflectance * (1.0 - reflectance));
-  const double g = std::exp(u);
-  return Found{End::kFound,
-               1.0 - g * g / 3.0,
-               x,
-               {-r.by_x / det * by_logit,
-                b.by_x / det / ratio,
-                r.by_u / det / x * by_logit,
-                -b.by_u / det / x / ratio}};
+  return find(reflectance, ratio);
 }
 
 }  // namespace opaline::reconstruct

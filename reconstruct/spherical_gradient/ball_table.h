@@ -58,8 +58,10 @@ class BallTable {
   static std::span<const Row> standard_rows();
 
   Light light(double reduced_albedo, double curvature) const;
-  /// Newton's iteration in (u, x).
+  /// Newton's iteration in (u, x), u = ln g.
   Found find(double reflectance, double ratio) const;
+  /// The same answer, sooner where `near` is what a neighbour found.
+  Found find(double reflectance, double ratio, const Found& near) const;
   /// r of a flat surface of that reflectance: where find() begins.
   double flat_ratio(double reflectance) const;
 
@@ -77,6 +79,12 @@ class BallTable {
     double by_u;
     double by_x;
   };
+  struct Place {
+    double u;
+    double x;
+  };
+  bool search(double log_ratio, double logit, int steps, Place& at) const;
+  Found found(double reflectance, double ratio, const Place& at) const;
   Value log_ratio(double u, double x) const;
   Value logit_reflectance(double u, double x) const;
   double decay_of(double reflectance, double curvature) const;  // u

@@ -194,8 +194,9 @@ void estimate_pixel(const WindowValues& w,
                     double pixel_mm,
                     const BallTable& table,
                     std::size_t at,
+                    BallTable::Found& found,
                     ScatteringMaps& maps) {
-  const BallTable::Found found = table.find(w.reflectance, w.ratio);
+  found = table.find(w.reflectance, w.ratio, found);
   maps.left_out[at] = reason_of(found.end);
   if (found.end != BallTable::End::kFound) return;
   const double curvature = w.curvature / pixel_mm;
@@ -259,6 +260,7 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
   const FlatRatios flat(table);
   const std::vector<WindowValues> windows = choose_windows(values, flat, options, team);
   team.run([&](int thread) {
+    BallTable::Found last;
     for (std::size_t at = share(thread); at < share(thread + 1); ++at) {
       const WindowValues& window = windows[at];
       if (values.measured[at] == 0 || window.count < 6) continue;
@@ -266,7 +268,7 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
       maps.left_out[at] =
           judge(window, flat.at(window.reflectance), ratio_variance(window, table), options.sigmas);
       if (maps.left_out[at] == LeftOut::kFound)
-        estimate_pixel(window, pictures.pixel_mm, table, at, maps);
+        estimate_pixel(window, pictures.pixel_mm, table, at, last, maps);
     }
   });
   return maps;

@@ -31,6 +31,10 @@ TEST(BallTable, FindsWhatALightIsOf) {
       ASSERT_EQ(found.end, BallTable::End::kFound) << albedo << ", " << curvature;
       EXPECT_NEAR(found.reduced_albedo, albedo, 1e-9);
       EXPECT_NEAR(found.curvature, curvature, 1e-8);
+      const BallTable::Found near = table.find(0.98 * light.reflectance, 1.02 * light.ratio);
+      const BallTable::Found sooner = table.find(light.reflectance, light.ratio, near);
+      EXPECT_NEAR(sooner.reduced_albedo, albedo, 1e-9);
+      EXPECT_NEAR(sooner.curvature, curvature, 1e-8);
     }
 }
 
