@@ -275,8 +275,7 @@ Result<void> run(const Case& which,
     if (auto judged = judge(which, "truth_", measured, margin, *truth, options, **solver); !judged)
       return judged;
     if (extras.posterior) {
-      auto printed =
-          print_posterior(which.name, measured, *truth, result->material, options, **solver);
+      auto printed = print_posterior(which.name, measured, *truth, *result, options, **solver);
       if (!printed) return printed;
     }
   }

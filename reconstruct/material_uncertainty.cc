@@ -58,6 +58,7 @@ class Uncertainties {
                 const UncertaintyContext& context)
       : dataset_(without_direct_light(dataset, found.direct_light_margin_mm)),
         options_(options),
+        found_(found),
         material_(found.material),
         posterior_(posterior),
         context_(context),
@@ -74,6 +75,9 @@ class Uncertainties {
       auto done = add_channel(c, stop);
       if (!done) return done.error().in(fmt::format("{} channel", kChannelNames[c]));
     }
+    if (has_held_out()) {
+      if (auto added = add_budget(stop); !added) return added.error().in("error budget");
+    }
     report_progress(kColorChannels);
     result_.seconds = seconds();
     return std::move(result_);
@@ -86,11 +90,28 @@ class Uncertainties {
         make_channel_problem(dataset_, static_cast<int>(c), options_, Selection::kFit);
     if (!problem) return problem.error();
     const ChannelCoefficients& estimate = material_.channels[c];
-    auto found = posterior(*problem, context_.solver, estimate, posterior_, stop);
+    const auto held_out = held_out_problem(dataset_, static_cast<int>(c), options_);
+    if (!held_out) return held_out.error();
+    auto found = held_out->has_value()
+                     ? posterior(*problem, **held_out, context_.solver, estimate, posterior_, stop)
+                     : posterior(*problem, context_.solver, estimate, posterior_, stop);
     if (!found) return found.error();
+    held_out_variance_ += found->held_out_variance;
     result_.channels[c] = report(*found, estimate);
     result_.channels[c].seconds = seconds() - begun;
     result_.material[c] = std::move(found->deviation);
+    return ok();
+  }
+
+  bool has_held_out() const {
+    return std::ranges::any_of(dataset_.illuminations,
+                               [](const Illumination& i) { return i.held_out; });
+  }
+
+  Result<void> add_budget(const std::stop_token& stop) {
+    const auto grid = discretisation_error(dataset_, material_, options_, context_.solver, stop);
+    if (!grid) return grid.error();
+    result_.budget = error_budget(dataset_, found_.predicted, *grid, held_out_variance_);
     return ok();
   }
 
@@ -127,15 +148,26 @@ class Uncertainties {
 
   Dataset dataset_;
   const InverseOptions& options_;
+  const InverseResult& found_;
   const Material& material_;
   PosteriorOptions posterior_;
   const UncertaintyContext& context_;
   std::chrono::nanoseconds start_;
+  double held_out_variance_ = 0.0;
   UncertaintyResult result_;
 };
 
 Json to_json(const DeviationByDepth& d) {
   return {{"prior", d.prior}, {"amplitude", d.amplitude}, {"layers", d.layers}};
+}
+
+Json to_json(const ErrorBudget& b) {
+  return {{"measured", b.measured},
+          {"noise", b.noise},
+          {"model", b.model},
+          {"discretisation", b.discretisation},
+          {"undetermined", b.undetermined},
+          {"sum", b.sum()}};
 }
 
 }  // namespace
@@ -169,10 +201,12 @@ Json to_json(const UncertaintyResult& uncertainty) {
                         {"reduced_scattering", to_json(r.reduced_scattering)},
                         {"diffusion", to_json(r.diffusion)}});
   }
-  return {{"length_mm", uncertainty.length_mm},
-          {"layer_mm", uncertainty.layer_mm},
-          {"seconds", uncertainty.seconds},
-          {"channels", std::move(channels)}};
+  Json json{{"length_mm", uncertainty.length_mm},
+            {"layer_mm", uncertainty.layer_mm},
+            {"seconds", uncertainty.seconds},
+            {"channels", std::move(channels)}};
+  if (uncertainty.budget) json["error_budget"] = to_json(*uncertainty.budget);
+  return json;
 }
 
 }  // namespace opaline::reconstruct

@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "base/uncertainty.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/error_budget.h"
 #include "reconstruct/inverse_options.h"
 #include "reconstruct/inverse_result.h"
 #include "reconstruct/posterior.h"
@@ -43,6 +44,7 @@ struct UncertaintyResult {
   double length_mm = 0.0;  ///< correlation length of the prior
   double layer_mm = 0.0;   ///< thickness of a layer of cells
   double seconds = 0.0;
+  std::optional<ErrorBudget> budget;  ///< where lights were held out
 };
 
 /// What the computation works with; all of it outlives the call.
@@ -70,6 +72,8 @@ Result<std::optional<UncertaintyResult>> material_uncertainty(const Dataset& dat
 ///   length_mm, layer_mm, seconds
 ///   channels [{channel, determined_diffusion, determined_absorption, solves, seconds,
 ///              absorption, reduced_scattering, diffusion {prior, amplitude, layers [..]}}]
+///
+///   error_budget {measured, noise, model, discretisation, undetermined, sum}   where lights were held out
 ///
 /// deviations of natural logarithms, layers from the seen face inwards.
 nlohmann::ordered_json to_json(const UncertaintyResult& uncertainty);

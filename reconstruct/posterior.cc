@@ -179,6 +179,45 @@ Result<void> check_prior(const char* name, const PriorOptions& p) {
       p.amplitude));
 }
 
+Result<ChannelPosterior> posterior_and(const ChannelProblem& problem,
+                                       const ChannelProblem* held_out,
+                                       diffusion::FluenceSolver& solver,
+                                       const ChannelCoefficients& estimate,
+                                       const PosteriorOptions& options,
+                                       std::stop_token stop) {
+  if (auto valid = validate(options); !valid) return valid.error();
+  Information info(problem, solver, options);
+  if (auto gathered = info.gather(estimate, stop); !gathered) return gathered.error();
+  const NormalEquations normal = info.normal_equations(options.discrepancy);
+  ChannelPosterior out;
+  out.diffusion = options.diffusion;
+  out.absorption = options.absorption;
+  if (options.find_amplitude)
+    out.diffusion.amplitude = likeliest_amplitude(info, normal, out.diffusion, out.absorption);
+  const VectorXd d = deviations(info, out.diffusion, out.absorption);
+  const auto factors = whitened(normal, d);
+  const MatrixXd covariance = factors.solve(MatrixXd::Identity(info.size(), info.size()));
+  const Index nk = info.diffusion().size();
+  const Index na = info.absorption().size();
+  out.determined_diffusion = static_cast<double>(nk) - covariance.diagonal().head(nk).sum();
+  out.determined_absorption = static_cast<double>(na) - covariance.diagonal().tail(na).sum();
+  const VectorXd y = d.cwiseProduct(factors.solve(d.cwiseProduct(normal.gradient)));
+  out.shift = shift_to(info, problem.block, y, logarithms(estimate));
+  Variances about = variances(info, problem.block, covariance, out.diffusion, out.absorption);
+  add_shift(out.shift, about);
+  out.deviation = uncertainty(about, estimate);
+  out.grid = info.grid();
+  out.solves = info.solves();
+  if (held_out == nullptr) return out;
+  Information unseen(*held_out, solver, options);
+  if (auto gathered = unseen.gather(estimate, std::move(stop)); !gathered) return gathered.error();
+  const MatrixXd products = d.asDiagonal() * unseen.normal_equations(0.0).hessian * d.asDiagonal();
+  out.held_out_variance =
+      MatrixXd(products.selfadjointView<Eigen::Lower>()).cwiseProduct(covariance).sum();
+  out.solves += unseen.solves();
+  return out;
+}
+
 }  // namespace
 
 Result<void> validate(const PosteriorOptions& o) {
@@ -201,30 +240,15 @@ Result<ChannelPosterior> posterior(const ChannelProblem& problem,
                                    const ChannelCoefficients& estimate,
                                    const PosteriorOptions& options,
                                    std::stop_token stop) {
-  if (auto valid = validate(options); !valid) return valid.error();
-  Information info(problem, solver, options);
-  if (auto gathered = info.gather(estimate, std::move(stop)); !gathered) return gathered.error();
-  const NormalEquations normal = info.normal_equations(options.discrepancy);
-  ChannelPosterior out;
-  out.diffusion = options.diffusion;
-  out.absorption = options.absorption;
-  if (options.find_amplitude)
-    out.diffusion.amplitude = likeliest_amplitude(info, normal, out.diffusion, out.absorption);
-  const VectorXd d = deviations(info, out.diffusion, out.absorption);
-  const auto factors = whitened(normal, d);
-  const MatrixXd covariance = factors.solve(MatrixXd::Identity(info.size(), info.size()));
-  const Index nk = info.diffusion().size();
-  const Index na = info.absorption().size();
-  out.determined_diffusion = static_cast<double>(nk) - covariance.diagonal().head(nk).sum();
-  out.determined_absorption = static_cast<double>(na) - covariance.diagonal().tail(na).sum();
-  const VectorXd y = d.cwiseProduct(factors.solve(d.cwiseProduct(normal.gradient)));
-  out.shift = shift_to(info, problem.block, y, logarithms(estimate));
-  Variances about = variances(info, problem.block, covariance, out.diffusion, out.absorption);
-  add_shift(out.shift, about);
-  out.deviation = uncertainty(about, estimate);
-  out.grid = info.grid();
-  out.solves = info.solves();
-  return out;
+  return posterior_and(problem, nullptr, solver, estimate, options, std::move(stop));
 }
 
+Result<ChannelPosterior> posterior(const ChannelProblem& problem,
+                                   const ChannelProblem& held_out,
+                                   diffusion::FluenceSolver& solver,
+                                   const ChannelCoefficients& estimate,
+                                   const PosteriorOptions& options,
+                                   std::stop_token stop) {
+  return posterior_and(problem, &held_out, solver, estimate, options, std::move(stop));
+}
 }  // namespace opaline::reconstruct

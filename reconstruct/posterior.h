@@ -53,7 +53,8 @@ struct ChannelPosterior {
   double determined_diffusion =
       0.0;  ///< effective number of parameters that the pictures determine
   double determined_absorption = 0.0;
-  Block grid;       ///< that the information was computed on
+  double held_out_variance = 0.0;  ///< of the held-out radiances, summed: trace(J C J^T)
+  Block grid;                      ///< that the information was computed on
   long solves = 0;  ///< for one right-hand side; all but one an illumination on `grid`
 };
 
@@ -90,6 +91,13 @@ struct ChannelPosterior {
 /// Errors:  kInvalidArgument for options; kCancelled; the solver's; kInternal when a solve stays
 /// far from its tolerance or the Hessian is not finite.
 Result<ChannelPosterior> posterior(const ChannelProblem& problem,
+                                   diffusion::FluenceSolver& solver,
+                                   const ChannelCoefficients& estimate,
+                                   const PosteriorOptions& options,
+                                   std::stop_token stop);
+/// Also how uncertain the posterior leaves the pictures of `held_out`, of the same sample.
+Result<ChannelPosterior> posterior(const ChannelProblem& problem,
+                                   const ChannelProblem& held_out,
                                    diffusion::FluenceSolver& solver,
                                    const ChannelCoefficients& estimate,
                                    const PosteriorOptions& options,

@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "bench/figure.h"
 #include "reconstruct/channel_problem.h"
+#include "reconstruct/error_budget.h"
 #include "reconstruct/posterior.h"
 
 namespace opaline::bench {
@@ -114,17 +115,27 @@ void print(const Dataset& dataset, const std::string& name, const std::vector<La
       "posterior.tightening_top2mm_of_shape", name, std::sqrt(top.shape / top.variance), "x");
 }
 
+void print_budget(const std::string& name, const reconstruct::ErrorBudget& budget) {
+  print_figure("budget.measured", name, budget.measured, "1");
+  print_figure("budget.sum", name, budget.sum(), "1");
+  print_figure("budget.noise", name, budget.noise, "1");
+  print_figure("budget.model", name, budget.model, "1");
+  print_figure("budget.discretisation", name, budget.discretisation, "1");
+  print_figure("budget.undetermined", name, budget.undetermined, "1");
+}
+
 }  // namespace
 
 Result<void> print_posterior(const std::string& name,
                              const Dataset& dataset,
                              const Material& truth,
-                             const Material& found,
+                             const reconstruct::InverseResult& result,
                              const reconstruct::InverseOptions& options,
                              reconstruct::diffusion::FluenceSolver& solver) {
   const SystemClock clock;
   double seconds = 0.0;
   long solves = 0;
+  double held_out_variance = 0.0;
   const auto layer_count = static_cast<std::size_t>(
       dataset.block.cells()[static_cast<std::size_t>(axis_of(dataset.seen_face))]);
   std::vector<Layer> diffusion(layer_count);
@@ -133,17 +144,20 @@ Result<void> print_posterior(const std::string& name,
   std::vector<Layer> absorption_mean(layer_count);
   for (int channel = 0; channel < kColorChannels; ++channel) {
     const auto c = static_cast<std::size_t>(channel);
-    const ChannelCoefficients& is = found.channels[c];
+    const ChannelCoefficients& is = result.material.channels[c];
     const ChannelCoefficients& was = truth.channels[c];
     const auto problem =
         reconstruct::make_channel_problem(dataset, channel, options, reconstruct::Selection::kFit);
     if (!problem) return problem.error();
     const auto start = clock.now();
-    const auto known =
-        reconstruct::posterior(*problem, solver, is, {.discrepancy = options.model_error}, {});
+    const auto held_out = reconstruct::held_out_problem(dataset, channel, options);
+    if (!held_out) return held_out.error();
+    const reconstruct::PosteriorOptions posterior{.discrepancy = options.model_error};
+    const auto known = reconstruct::posterior(*problem, **held_out, solver, is, posterior, {});
     if (!known) return known.error();
     seconds += std::chrono::duration<double>(clock.now() - start).count();
     solves = std::max(solves, known->solves);
+    held_out_variance += known->held_out_variance;
     std::vector<double> by_diffusion;
     std::vector<double> by_absorption;
     for (std::size_t i = 0; i < is.absorption.size(); ++i) {
@@ -167,6 +181,12 @@ Result<void> print_posterior(const std::string& name,
   print(dataset, name + ", log sigma_a, posterior mean", absorption_mean);
   print_figure("posterior.solves", name, static_cast<double>(solves), "1");
   print_figure("posterior.seconds", name, seconds, "s");
+  const auto grid =
+      reconstruct::discretisation_error(dataset, result.material, options, solver, {});
+  if (!grid) return grid.error();
+  const auto budget =
+      reconstruct::error_budget(dataset, result.predicted, *grid, held_out_variance);
+  if (budget) print_budget(name, *budget);
   return ok();
 }
 

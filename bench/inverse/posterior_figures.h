@@ -7,6 +7,7 @@
 #include "base/result.h"
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "reconstruct/inverse_options.h"
+#include "reconstruct/inverse_result.h"
 
 namespace opaline::bench {
 
@@ -23,11 +24,12 @@ namespace opaline::bench {
 ///                                prior left out, how much is learned beyond the mean
 /// each about what was reported and, ", posterior mean", about the posterior's own mean;
 ///
+///   budget.measured, .sum, ...   reconstruct/error_budget.h
 ///   posterior.solves, .seconds   for one right-hand side and channel; all channels
 Result<void> print_posterior(const std::string& name,
                              const Dataset& dataset,
                              const Material& truth,
-                             const Material& found,
+                             const reconstruct::InverseResult& result,
                              const reconstruct::InverseOptions& options,
                              reconstruct::diffusion::FluenceSolver& solver);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "base/material.h"
 #include "daemon/report/html.h"
@@ -114,6 +115,28 @@ std::string table_of(const Told& told) {
   return html::table(header, rows);
 }
 
+// Nothing where no light was held out.
+std::string budget_of(const json& reconstruction) {
+  const json told = reconstruction.value("uncertainty", json::object());
+  const json budget = told.value("error_budget", json::object());
+  if (budget.empty()) return "";
+  std::vector<Row> rows;
+  for (const auto& [key, meaning] :
+       {std::pair{"noise", "noise of the held-out pictures"},
+        {"model",
+         "model: what no material explains in the pictures of the fit, beyond noise and grid"},
+        {"discretisation", "discretisation: what a grid twice as fine changes, extrapolated"},
+        {"undetermined", "undetermined: what the pictures of the fit leave open"},
+        {"sum", "together (squares add)"},
+        {"measured", "measured"}})
+    rows.push_back({meaning, fmt::format("{:.2f} %", 100.0 * budget.value(key, 0.0))});
+  return html::paragraph(
+             "The relighting error of the held-out lights on the sample's surface, and what it is "
+             "made of. Calibration is not in it: the pictures of the fit and the held-out ones "
+             "share it, so it shows in the coefficients and not here.") +
+         html::table({"part", "relative error"}, rows);
+}
+
 CurvePlot plot_of(const Told& told, std::size_t q) {
   CurvePlot plot{"depth below the seen face, mm",
                  fmt::format("standard deviation of ln {}", kQuantities[q].symbol),
@@ -159,7 +182,8 @@ std::string uncertainty_section(const json& reconstruction) {
              "model's error counts, in part as noise that differs from datum to datum, in part as "
              "one that is smooth over a picture; where it is larger than model_error, the true "
              "deviations are larger. Those of each cell are in material.vdb: "
-             "absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd.");
+             "absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd.") +
+         budget_of(reconstruction);
 }
 
 std::vector<std::pair<std::string, CurvePlot>> uncertainty_plots(const json& reconstruction) {

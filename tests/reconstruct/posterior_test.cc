@@ -121,7 +121,8 @@ MatrixXd data_covariance(const ChannelProblem& problem, double discrepancy) {
 
 struct Gaussian {
   MatrixXd covariance;
-  Eigen::VectorXd shift;  // of the mean, from the estimate
+  double picture_variance;  // of the unweighted radiances, summed
+  Eigen::VectorXd shift;    // of the mean, from the estimate
 };
 
 /// Of (log kappa, log sigma_a) of all cells given the data, the prior about each one's mean.
@@ -150,7 +151,16 @@ Gaussian conditional(const ChannelProblem& problem,
       (data_covariance(problem, options.discrepancy) + j * prior * j.transpose()).inverse();
   const Eigen::VectorXd misfit =
       j * from_mean - Eigen::Map<const Eigen::VectorXd>(residual.data(), j.rows());
-  return {prior - gain * j * prior, gain * misfit - from_mean};
+  const MatrixXd covariance = prior - gain * j * prior;
+  const Eigen::VectorXd whitened = (j * covariance * j.transpose()).diagonal();
+  double variance = 0.0;
+  Index d = 0;
+  for (const auto& i : problem.illuminations)
+    for (const double w : i.weight) {
+      if (w > 0.0) variance += whitened[d] / w;
+      ++d;
+    }
+  return {covariance, variance, gain * misfit - from_mean};
 }
 
 class PosteriorOf : public testing::TestWithParam<Case> {};
@@ -163,9 +173,13 @@ TEST_P(PosteriorOf, IsTheGaussianConditionalWrittenDownInCells) {
   const ChannelCoefficients c = random_medium(problem.block.cell_count(), 3);
   const PosteriorOptions options{.find_amplitude = false, .discrepancy = 0.02};
   testing_support::DirectSolver solver;
-  const auto found = posterior(problem, solver, c, options, {});
+  ChannelProblem unweighted = problem;
+  for (auto& i : unweighted.illuminations)
+    for (double& w : i.weight) w = w > 0.0 ? 1.0 : 0.0;
+  const auto found = posterior(problem, unweighted, solver, c, options, {});
   ASSERT_TRUE(found) << found.error().message;
-  const auto [expected, shift] = conditional(problem, c, options);
+  const auto [expected, picture_variance, shift] = conditional(problem, c, options);
+  EXPECT_NEAR(found->held_out_variance, picture_variance, 1e-6 * picture_variance);
   const auto cells = static_cast<Index>(problem.block.cell_count());
   double tightest = 1.0;
   for (Index i = 0; i < cells; ++i) {
