@@ -14,7 +14,8 @@ namespace {
 constexpr BallTable::Row kRows[]{
 #include "reconstruct/spherical_gradient/ball_table.inc"
 };
-constexpr int kBendPowers = 4;  // x^1 ... x^4
+constexpr int kBendPowers = 4;    // x^1 ... x^4
+constexpr double kWhite = 0.003;  // relative: better than any white target
 constexpr int kIterations = 40;
 constexpr double kArrived = 1e-9;  // quadratic: the next step would be nothing
 
@@ -85,8 +86,8 @@ Result<BallTable> BallTable::make(std::span<const Row> rows) {
     const double g = decay(row.reduced_albedo);
     const double u = std::log(g);
     const double ratio_weight = row.ratio / row.ratio_deviation;
-    const double logit_weight =
-        row.reflectance * (1.0 - row.reflectance) / row.reflectance_deviation;
+    const double logit_weight = (1.0 - row.reflectance) * row.reflectance /
+                                std::hypot(row.reflectance_deviation, kWhite * row.reflectance);
     log_ratios[n] = ratio_weight * std::log(row.ratio);
     logits[n] = logit_weight * logit(row.reflectance);
     Eigen::Index at = 0;

@@ -17,7 +17,7 @@ namespace opaline::reconstruct {
 ///
 ///   ln r = sum_i a_i g^i + g sum_(j=1..6) x^j sum_i f_ji g^i,     logit R = sum_(j=0..5) x^j sum_i h_ji g^i,     x = k l_d
 ///
-/// fitted to the balls by least squares, each ball weighed by its own deviation. Both are smooth in g, where absorption ends too.
+/// fitted to the balls by least squares, each ball weighed by its own deviation (of R not less than 0.3 %). Both are smooth in g, where absorption ends too.
 ///
 /// Threads: const after make().
 class BallTable {
