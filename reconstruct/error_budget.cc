@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/ensure.h"
 #include "reconstruct/prediction.h"
 
 namespace opaline::reconstruct {
@@ -104,6 +105,7 @@ std::optional<ErrorBudget> error_budget(const Dataset& dataset,
                                         const std::vector<Image<float>>& predicted,
                                         double discretisation,
                                         double held_out_variance) {
+  ENSURE(predicted.size() == dataset.illuminations.size());
   Sums fitted;
   Sums held_out;
   for (std::size_t m = 0; m < dataset.illuminations.size(); ++m) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "reconstruct/host/host_solver.h"
+#include "reconstruct/prediction.h"
 #include "tests/support/synthetic_dataset.h"
 
 namespace opaline::reconstruct {
@@ -48,6 +49,7 @@ class MaterialUncertaintyTest : public ::testing::Test {
           }
       found_.channels[c].model = "heterogeneous";
     }
+    found_.predicted = *predict(dataset_, found_.material, {}, *solver_, {});
   }
 
   Result<std::optional<UncertaintyResult>> compute() {
@@ -131,6 +133,9 @@ TEST_F(MaterialUncertaintyTest, WritesWhatTheReportShows) {
   EXPECT_EQ(json["channels"][2]["channel"], "blue");
   EXPECT_EQ(json["channels"][2]["absorption"]["layers"].get<std::vector<double>>(),
             (*result)->channels[2].absorption.layers);
+  ASSERT_TRUE((*result)->budget);
+  EXPECT_GT((*result)->budget->undetermined, 0.0);
+  EXPECT_EQ(json["error_budget"]["sum"].get<double>(), (*result)->budget->sum());
   EXPECT_EQ(json["channels"][0]["diffusion"]["amplitude"].get<double>(),
             (*result)->channels[0].diffusion.amplitude);
 }
