@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -130,6 +131,26 @@ Dataset only(const Dataset& dataset, const std::string& kind) {
   return some;
 }
 
+/// Of the cells of all held-out pictures, those that an error is taken over.
+double held_out_share(const Dataset& dataset) {
+  std::size_t counted = 0;
+  std::size_t all = 0;
+  for (const Illumination& i : dataset.illuminations) {
+    if (!i.held_out) continue;
+    const auto cells = i.mask.samples();
+    counted += cells.size() - static_cast<std::size_t>(std::ranges::count(cells, 0));
+    all += cells.size();
+  }
+  return all == 0 ? 0.0 : static_cast<double>(counted) / static_cast<double>(all);
+}
+
+/// What the true material relights wrongly beyond the data's noise. Not for a material fitted to pictures of the same
+/// paths: it has learned some of that noise.
+double model_floor(const reconstruct::RelightingError& error) {
+  return std::sqrt(
+      std::max(0.0, error.error * error.error - error.noise_floor * error.noise_floor));
+}
+
 /// Relighting errors by kind of light, and E = sum (R' - R)^2 / sum R^2 over all patches, cells and channels.
 Result<void> judge(const Case& which,
                    const char* what,
@@ -149,6 +170,8 @@ Result<void> judge(const Case& which,
     const std::string name = *kind == 0 ? which.name : fmt::format("{}, {}", which.name, kind);
     print_figure(prefix + "relighting_error", name, error.error, "1");
     print_figure(prefix + "noise_floor", name, error.noise_floor, "1");
+    if (std::string_view(what) == "truth_")
+      print_figure("inverse.model_floor", name, model_floor(error), "1");
   }
   const Dataset patches =
       reconstruct::without_direct_light(patch_dataset(which.responses), margin_mm);
@@ -269,6 +292,7 @@ Result<void> run(const Case& which,
   const double margin = result->direct_light_margin_mm;
   if (margin > 0.0) print_figure("inverse.direct_light_margin", which.name, margin, "mm");
   const Dataset measured = reconstruct::without_direct_light(dataset, margin);
+  print_figure("inverse.share_of_held_out_cells", which.name, held_out_share(measured), "1");
   if (const auto scene = sim::scene_from_json(which.responses.scene)) {
     const auto truth = sim::make_material(*scene);
     if (!truth) return truth.error();
