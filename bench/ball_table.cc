@@ -46,8 +46,8 @@ void print_row(const Arguments& arguments, double albedo, double curvature, Thre
 }  // namespace opaline::bench
 
 int main(int argc, char** argv) try {
-  using namespace opaline::bench;
-  Arguments arguments;
+  namespace bench = opaline::bench;
+  bench::Arguments arguments;
   CLI::App app{
       "Traces the table of balls under constant and gradient light: albedo, curvature times "
       "translucency, reflectance and\n"
@@ -59,8 +59,9 @@ int main(int argc, char** argv) try {
   app.add_option("--seed", arguments.seed, "Of all balls")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   opaline::ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
-  for (const double albedo : kAlbedos)
-    for (const double curvature : kCurvatures) print_row(arguments, albedo, curvature, team);
+  for (const double albedo : bench::kAlbedos)
+    for (const double curvature : bench::kCurvatures)
+      bench::print_row(arguments, albedo, curvature, team);
   return 0;
 } catch (const std::exception& error) {
   std::fputs(error.what(), stderr);

@@ -224,7 +224,7 @@ void measure_time(ThreadTeam& team) {
 }  // namespace opaline::bench
 
 int main(int argc, char** argv) try {
-  using namespace opaline::bench;
+  namespace bench = opaline::bench;
   std::int64_t paths = 2'000'000;
   CLI::App app{
       "Scattering parameters from four pictures: errors, coverage, time.\n\nExample: scripts/bench "
@@ -232,10 +232,10 @@ int main(int argc, char** argv) try {
   app.add_option("--paths", paths, "A traced ball")->check(CLI::Range(10'000, 1'000'000'000));
   CLI11_PARSE(app, argc, argv);
   opaline::ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
-  measure_formulas();
-  measure_materials(team, paths);
-  measure_noise(team, paths);
-  measure_time(team);
+  bench::measure_formulas();
+  bench::measure_materials(team, paths);
+  bench::measure_noise(team, paths);
+  bench::measure_time(team);
   return 0;
 } catch (const std::exception& error) {
   std::fputs(error.what(), stderr);

@@ -31,7 +31,8 @@ BallPictures draw_ball(const BallScene& scene, const BallLight& light) {
   const double constant = scene.white * light.reflectance;
   for (std::size_t at = 0; at < count; ++at) {
     const auto x = static_cast<double>(at % static_cast<std::size_t>(p.width));
-    const auto y = static_cast<double>(at / static_cast<std::size_t>(p.width));
+    const std::size_t row = at / static_cast<std::size_t>(p.width);
+    const auto y = static_cast<double>(row);
     const double nx = bulge * (x - 0.5 * p.width) * scene.pixel_mm / scene.radius_mm;
     const double ny = bulge * (y - 0.5 * p.height) * scene.pixel_mm / scene.radius_mm;
     const double across = nx * nx + ny * ny;

@@ -164,7 +164,8 @@ void add_row(const double* values, int count, int ratio, double factor, double* 
     for (int n = 0; n < count; ++n) sums[n] += factor * values[n];
     return;
   }
-  for (int n = 0; n < count / 2; ++n) sums[n] += factor * (values[2 * n] + values[2 * n + 1]);
+  for (std::ptrdiff_t n = 0; n < count / 2; ++n)
+    sums[n] += factor * (values[2 * n] + values[2 * n + 1]);
   if (count % 2 == 1) sums[count / 2] += factor * values[count - 1];
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace opaline::reconstruct {
 namespace {
@@ -63,7 +64,7 @@ void add_pixel(const PixelValues& p, int x, int y, int origin, double sign, Sums
 
 WindowValues fitted(const Sums& s) {
   WindowValues w;
-  w.count = static_cast<int>(s[kCount] + 0.5);
+  w.count = static_cast<int>(std::lround(s[kCount]));
   if (w.count < 6) return w;
   const double n = s[kCount];
   const double x = s[kX] / n;

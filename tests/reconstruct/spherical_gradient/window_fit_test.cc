@@ -10,6 +10,7 @@ namespace opaline::reconstruct {
 namespace {
 
 constexpr int kSize = 101;
+constexpr int kMiddle = 50;
 constexpr double kRadius = 60.0;  // pixels
 
 /// A ball's normals, with Gaussian noise.
@@ -20,8 +21,8 @@ PixelValues ball(double noise, unsigned seed = 1) {
   for (int y = 0; y < kSize; ++y)
     for (int x = 0; x < kSize; ++x) {
       const std::size_t at = p.index(x, y);
-      const double i = x - kSize / 2;
-      const double j = y - kSize / 2;
+      const double i = x - kMiddle;
+      const double j = y - kMiddle;
       p.normal_x[at] = static_cast<float>(i / kRadius + noise * gaussian(random));
       p.normal_y[at] = static_cast<float>(j / kRadius + noise * gaussian(random));
       p.normal_variance[at] = static_cast<float>(noise * noise);
@@ -53,7 +54,7 @@ TEST(WindowFit, FindsABallsCurvatureInWindowsOfAnySizeAtAnyPlace) {
 
 TEST(WindowFit, StatesTheCurvaturesUncertainty) {
   constexpr int kDraws = 200;
-  const std::size_t middle = PixelValues(kSize, kSize).index(kSize / 2, kSize / 2);
+  const std::size_t middle = PixelValues(kSize, kSize).index(kMiddle, kMiddle);
   double squares = 0.0;
   double stated = 0.0;
   for (unsigned seed = 0; seed < kDraws; ++seed) {
