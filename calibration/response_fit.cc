@@ -152,7 +152,7 @@ class NormalEquations {
       for_each_entry(s, [&](int i, double) { touched.push_back(i); });
     }
     std::ranges::sort(touched);
-    touched.erase(std::ranges::unique(touched).begin(), touched.end());
+    touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
     for (const int i : touched) {
       for (const int j : touched) matrix_(i, j) -= weight * mean[i] * mean[j];
     }
