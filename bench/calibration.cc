@@ -51,7 +51,8 @@ Result<double> response_error(int bits) {
   const sim::Sensor sensor(o, 7);
   std::vector<Image<std::uint16_t>> frames;
   std::vector<double> seconds;
-  for (double t = 1.0 / 60.0; t < 1.2; t *= 2.0) {
+  for (int frame = 0; frame < 7; ++frame) {
+    const double t = std::ldexp(1.0 / 60.0, frame);
     frames.push_back(sensor.read(ramp(t), t, frames.size()));
     seconds.push_back(t);
   }

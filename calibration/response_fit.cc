@@ -17,6 +17,7 @@ constexpr std::size_t kMostPixels = 6000;
 constexpr int kFewestPixels = 50;
 constexpr double kLowest = 0.01;
 constexpr double kHighest = 0.98;
+constexpr double kTelling = 1.9;      // times as long: a growth that noise does not hide
 constexpr double kGrowth = 1.05;      // of the code, at least, where the time doubles
 constexpr double kSmoothness = 30.0;  // lambda, per pixel's worth of weight
 constexpr int kRounds = 6;
@@ -51,12 +52,15 @@ double between(const Eigen::VectorXd& unknowns, double fraction) {
   return (1.0 - p.share) * unknowns[p.knot] + p.share * unknowns[p.knot + 1];
 }
 
+// From the first sample to the first one at least twice as long: closer ones differ by less than noise and rounding may take away.
 bool stuck(const std::vector<Sample>& samples, std::span<const Exposure> stack) {
+  std::size_t from = 0;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    const double times =
-        stack[samples[i].exposure].seconds / stack[samples[i - 1].exposure].seconds;
-    const double codes = samples[i].fraction / samples[i - 1].fraction;
+    const double times = stack[samples[i].exposure].seconds / stack[samples[from].exposure].seconds;
+    if (times < kTelling) continue;
+    const double codes = samples[i].fraction / samples[from].fraction;
     if (codes < std::pow(kGrowth, std::log2(times))) return true;
+    from = i;
   }
   return false;
 }
@@ -213,6 +217,7 @@ void measure_residual(Pixel& pixel, const Eigen::VectorXd& unknowns) {
 
 double median_residual(const std::vector<Pixel>& pixels) {
   std::vector<double> residuals;
+  residuals.reserve(pixels.size());
   for (const Pixel& pixel : pixels) residuals.push_back(pixel.residual);
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   std::ranges::nth_element(residuals, middle);

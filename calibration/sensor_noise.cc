@@ -19,6 +19,7 @@ constexpr double kOutlying = 5.0;     // standard deviations
 constexpr double kHot = 8.0;          // standard deviations
 constexpr double kMadToSigma = 1.4826;
 constexpr double kQuantisation = 1.0 / 12.0;
+constexpr double kResolved = 0.45;  // codes: half a code, less what it may be measured too low by
 
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -46,20 +47,19 @@ struct Level {
   double count = 0.0;
 };
 
-std::vector<Bin> sorted_by_light(std::span<const FramePair> pairs, CodeRange range, int channel) {
+// Bins of one pair: those of two exposures would hold two noises, and the darker one would take the brighter one for outlying.
+std::vector<Bin> sorted_by_light(const FramePair& pair, CodeRange range, int channel) {
   std::vector<Bin> bins(kBins);
   const double width = kBrightest * (range.clipping - range.black) / (kBins - 0.5);
-  for (const FramePair& pair : pairs) {
-    for (std::size_t i = 0; i < pair.first->pixel_count(); ++i) {
-      const std::size_t sample = i * pair.first->channels() + channel;
-      const double a = pair.first->samples()[sample];
-      const double b = pair.second->samples()[sample];
-      const double mean = 0.5 * (a + b) - range.black;
-      const auto bin = static_cast<std::ptrdiff_t>(std::floor(mean / width + 0.5));
-      if (bin < 0 || bin >= static_cast<std::ptrdiff_t>(kBins)) continue;
-      bins[static_cast<std::size_t>(bin)].means.push_back(mean);
-      bins[static_cast<std::size_t>(bin)].differences.push_back(a - b);
-    }
+  for (std::size_t i = 0; i < pair.first->pixel_count(); ++i) {
+    const std::size_t sample = i * pair.first->channels() + channel;
+    const double a = pair.first->samples()[sample];
+    const double b = pair.second->samples()[sample];
+    const double mean = 0.5 * (a + b) - range.black;
+    const auto bin = static_cast<std::ptrdiff_t>(std::floor(mean / width + 0.5));
+    if (bin < 0 || bin >= static_cast<std::ptrdiff_t>(kBins)) continue;
+    bins[static_cast<std::size_t>(bin)].means.push_back(mean);
+    bins[static_cast<std::size_t>(bin)].differences.push_back(a - b);
   }
   return bins;
 }
@@ -67,7 +67,7 @@ std::vector<Bin> sorted_by_light(std::span<const FramePair> pairs, CodeRange ran
 Level level_of(const Bin& bin) {
   Level level;
   const double centre = median_of(bin.differences);
-  const double limit = kOutlying * std::max(deviation_about(centre, bin.differences), 1.0);
+  const double limit = kOutlying * std::max(deviation_about(centre, bin.differences), 1.0) + 1.0;
   double sum = 0.0;
   double squares = 0.0;
   for (std::size_t i = 0; i < bin.means.size(); ++i) {
@@ -172,10 +172,14 @@ Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
     return invalid_argument(
         fmt::format("pixels clip at code {} and are black at {}", range.clipping, range.black));
   std::vector<Level> levels;
-  for (const Bin& bin : sorted_by_light(pairs, range, channel)) {
-    if (bin.means.size() >= kFewest) levels.push_back(level_of(bin));
-  }
-  if (levels.size() < 3 || levels.back().mean < 0.2 * (range.clipping - range.black))
+  double brightest = 0.0;
+  for (const FramePair& pair : pairs)
+    for (const Bin& bin : sorted_by_light(pair, range, channel)) {
+      if (bin.means.size() < kFewest) continue;
+      levels.push_back(level_of(bin));
+      brightest = std::max(brightest, levels.back().mean);
+    }
+  if (levels.size() < 3 || brightest < 0.2 * (range.clipping - range.black))
     return invalid_argument(
         fmt::format("photon transfer needs three levels of light up to a fifth of the code range "
                     "at least; the pairs have {}",
@@ -186,8 +190,11 @@ Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
         "the noise does not grow with the light: the pictures are processed, or the response is "
         "not linear");
   const double gain = 1.0 / line.slope;
-  return PhotonTransfer{
-      gain, gain * std::sqrt(std::max(0.0, line.at_zero)), line.slope_deviation * gain * gain};
+  const bool resolved = line.at_zero > kResolved * kResolved;
+  return PhotonTransfer{gain,
+                        gain * (resolved ? std::sqrt(line.at_zero) : 0.5),
+                        resolved,
+                        line.slope_deviation * gain * gain};
 }
 
 Result<DarkFrame> measure_dark(std::span<const Image<std::uint16_t>* const> frames) {

@@ -18,7 +18,10 @@ struct FramePair {
 /// What a linear sensor's own noise tells of it.
 struct PhotonTransfer {
   double electrons_per_code = 0.0;
-  double read_noise_electrons = 0.0;          ///< without quantisation
+  double read_noise_electrons =
+      0.0;  ///< without quantisation; half a code where it is not resolved
+  bool read_noise_resolved =
+      true;  ///< false below half a code, where rounding is no longer noise of 1/12: it is at most that
   double electrons_per_code_deviation = 0.0;  ///< standard, of the fit
 };
 
@@ -27,7 +30,7 @@ struct PhotonTransfer {
 ///
 ///   v = m / K + (r / K)^2 + 1/12                                     codes^2
 ///
-/// fitted over 32 bins of m, each weighing by n / (2 v^2), up to 85 % of the code range. The difference is free of fixed patterns, and as
+/// fitted over 32 bins of m of each pair, each weighing by n / (2 v^2), up to 85 % of the code range. The difference is free of fixed patterns, and as
 /// sum and difference of two Poisson counts are uncorrelated, sorting pixels by the sum selects nothing. Of each bin the
 /// differences beyond five standard deviations (from the median) are left out.
 /// Errors: kInvalidArgument for shapes, and when the pairs span too little light or noise does not grow with it.

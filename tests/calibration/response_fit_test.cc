@@ -75,6 +75,19 @@ double rms_error(const capture::ResponseCurve& curve, double gamma) {
 // The goal set for the station: 1 % of full scale over 5 to 95 % of the range.
 constexpr double kGoal = 0.01;
 
+TEST(ResponseFit, TakesExposuresThatLieClose) {
+  std::vector<double> seconds;
+  for (int j = 0; j < 44; ++j) seconds.push_back(std::pow(1.1, j) / 60.0);
+  for (const double gamma : {1.0, 2.2}) {
+    Stack stack(optics(8, gamma), seconds);
+    stack.seconds = seconds;
+    const auto fit = stack.fit();
+    ASSERT_TRUE(fit) << fit.error().message;
+    EXPECT_LT(rms_error(fit->curve, gamma), 0.01);
+    EXPECT_LT(fit->pixels_refused, kWidth * kHeight / 50);
+  }
+}
+
 TEST(ResponseFit, FindsTheResponseOfEachDepthAndChannelWithinAPercent) {
   for (const int bits : {8, 12, 16}) {
     for (const double gamma : {1.0, 1.8, 2.2}) {

@@ -57,6 +57,23 @@ TEST(PhotonTransfer, FindsGainAndReadNoiseOfASimulatedSensor) {
   }
 }
 
+TEST(PhotonTransfer, FindsTheReadNoiseOfAQuietSensor) {
+  for (const double codes : {0.6, 1.2}) {  // 1.2: the simulated rig's own
+    const auto found = measured(optics(2.5, 2.5 * codes));
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_TRUE(found->read_noise_resolved);
+    EXPECT_NEAR(found->read_noise_electrons, 2.5 * codes, 0.05 * 2.5 * codes);
+  }
+}
+
+TEST(PhotonTransfer, SaysWhereRoundingHidesTheReadNoise) {
+  const auto found = measured(optics(8.0, 2.0));
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_FALSE(found->read_noise_resolved);
+  EXPECT_EQ(found->read_noise_electrons, 0.5 * found->electrons_per_code);
+  EXPECT_NEAR(found->electrons_per_code, 8.0, 0.02 * 8.0);
+}
+
 TEST(PhotonTransfer, IsNotMisledByHotPixels) {
   sim::CameraOptics o = optics(2.5, 10.0);
   o.hot_pixel_fraction = 0.02;
