@@ -30,7 +30,10 @@ bool meets(const Box& box, const Ray& ray, double enter, double leave) {
       if (o < low || o > high) return false;
       continue;
     }
-    const auto [near, far] = std::minmax((low - o) / d, (high - o) / d);
+    const double first = (low - o) / d;
+    const double second = (high - o) / d;
+    const double near = std::min(first, second);
+    const double far = std::max(first, second);
     enter = std::max(enter, near - kRim * std::abs(near));
     leave = std::min(leave, far + kRim * std::abs(far));
   }
