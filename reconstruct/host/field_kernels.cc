@@ -78,27 +78,19 @@ double residual(const FieldLine& line, double scale, T* r, int nx) {
   return first * first + hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
-template <class T>
-void add(double* x, const T* c, double factor, int nx) {
+/// x = factor c, on top of what x was where it is kept.
+template <bool kKept, class T>
+void move(double* x, const T* c, double factor, int nx) {
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
   const V f = hn::Set(d, factor);
   int i = 0;
   for (; i + step <= nx; i += step) {
-    hwy::Prefetch(x + i + kAhead);
-    hn::StoreU(hn::MulAdd(f, load(c + i), hn::LoadU(d, x + i)), d, x + i);
+    if constexpr (kKept) hwy::Prefetch(x + i + kAhead);
+    const V before = kKept ? hn::LoadU(d, x + i) : hn::Zero(d);
+    hn::StoreU(hn::MulAdd(f, load(c + i), before), d, x + i);
   }
-  for (; i < nx; ++i) x[i] += factor * static_cast<double>(c[i]);
-}
-
-template <class T>
-void set(double* x, const T* c, double factor, int nx) {
-  const D d;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  const V f = hn::Set(d, factor);
-  int i = 0;
-  for (; i + step <= nx; i += step) hn::StoreU(hn::Mul(f, load(c + i)), d, x + i);
-  for (; i < nx; ++i) x[i] = factor * static_cast<double>(c[i]);
+  for (; i < nx; ++i) x[i] = (kKept ? x[i] : 0.0) + factor * static_cast<double>(c[i]);
 }
 
 template <class T>
@@ -209,10 +201,10 @@ void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, 
 #endif
 
 FieldKernels<float> single_kernels() {
-  return {residual<float>, add<float>, set<float>, to_fields, to_lanes};
+  return {residual<float>, move<true, float>, move<false, float>, to_fields, to_lanes};
 }
 FieldKernels<double> double_kernels() {
-  return {residual<double>, add<double>, set<double>, to_fields, to_lanes};
+  return {residual<double>, move<true, double>, move<false, double>, to_fields, to_lanes};
 }
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE

@@ -11,7 +11,7 @@ namespace opaline::reconstruct {
 
 /// What balls show under constant and gradient light, from transport: the default way from pictures to scattering parameters.
 ///
-/// The dipole, even corrected (curvature_ratio.h), returns 1.3 to 3.4 times the true D of Monte Carlo balls at k l_d of 0.05 to 0.4: light
+/// The dipole, even corrected (curvature_ratio.h), returns 1.3 to 3.9 times the true D of Monte Carlo balls at k l_d of 0.05 to 0.4: light
 /// that comes in slanted goes on slanted, which a ball's normals notice and a dipole does not. So (alpha', k l_d) is looked up in traced
 /// balls (bench/ball_table.cc; sim/ball_transport.h), k the mean curvature, l_d = 1/sigma_tr = 3 D / g the translucency, g = sqrt(3 (1 - alpha')):
 ///

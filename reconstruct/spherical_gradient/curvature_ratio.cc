@@ -92,7 +92,7 @@ double CurvatureRatio::ratio(double reduced_albedo, double bend) const {
 }
 
 double CurvatureRatio::ratio_by_quadrature(double reduced_albedo, double bend) const {
-  const double real = 3.0 * 1.0;  // lengths in units of D
+  const double real = 3.0;  // lengths in units of D
   const double image = real * (1.0 + b_);
   const double sigma = decay(reduced_albedo) / 3.0;
   const auto reflected = [&](double k) {
