@@ -1,7 +1,5 @@
 #include "reconstruct/information.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "reconstruct/adjoint.h"
 #include "reconstruct/objective.h"
 #include "reconstruct/resample.h"
+#include "reconstruct/solve_check.h"
 
 namespace opaline::reconstruct {
 namespace {
@@ -22,8 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kBatch = 32;  // right-hand sides a solve
-constexpr double kUselessResidual = 1e-3;
+constexpr int kBatch = 32;                 // right-hand sides a solve
 constexpr double kLeastScattering = 1e-6;  // 1/mm, where averaging leaves none
 
 std::vector<double> less_mean(std::vector<double> u) {
@@ -132,12 +130,7 @@ Result<FieldBatch> Information::solve(const FieldBatch& b, std::stop_token stop)
     const auto summary = solver_.solve(some, found, {.tolerance = options_.tolerance}, stop);
     if (!summary) return summary.error();
     if (summary->termination == diffusion::Termination::kCancelled) return cancelled("posterior");
-    if (!(summary->relative_residual < kUselessResidual)) {
-      return internal_error(
-          fmt::format("diffusion solve stopped at a relative residual of {:.1e}: {}",
-                      summary->relative_residual,
-                      summary->message));
-    }
+    if (auto useful = check_useful(*summary); !useful) return useful.error();
     std::copy_n(found.values.begin(), found.values.size(), x.field(first));
     solves_ += count;
   }

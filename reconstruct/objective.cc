@@ -1,12 +1,11 @@
 #include "reconstruct/objective.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "base/ensure.h"
 #include "reconstruct/diffusion/medium.h"
+#include "reconstruct/solve_check.h"
 
 namespace opaline::reconstruct {
 
@@ -14,9 +13,6 @@ using diffusion::FieldBatch;
 using diffusion::MediumGradient;
 
 namespace {
-
-constexpr double kUselessResidual =
-    1e-3;  // a solve that stays above this says nothing about the medium
 
 std::vector<double> logarithms(const std::vector<double>& values) {
   std::vector<double> logs(values.size());
@@ -64,15 +60,7 @@ Result<void> Objective::solve(const FieldBatch& b, FieldBatch& x, std::stop_toke
   const auto summary = solver_.solve(b, x, {.tolerance = settings_.tolerance}, stop);
   if (!summary) return summary.error();
   solves_ += b.count;
-  if (summary->termination == diffusion::Termination::kCancelled)
-    return cancelled("diffusion solve");
-  if (!(summary->relative_residual < kUselessResidual)) {
-    return internal_error(
-        fmt::format("diffusion solve stopped at a relative residual of {:.1e}: {}",
-                    summary->relative_residual,
-                    summary->message));
-  }
-  return ok();
+  return check_useful(*summary);
 }
 
 Result<void> Objective::solve_forward(const ChannelCoefficients& coefficients,

@@ -1,19 +1,16 @@
 #include "reconstruct/tangent.h"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cmath>
 
 #include "base/ensure.h"
+#include "reconstruct/solve_check.h"
 
 namespace opaline::reconstruct {
 namespace {
 
 using diffusion::FieldBatch;
 using diffusion::MediumChange;
-
-constexpr double kUselessResidual = 1e-3;
 
 // dkappa = -3 kappa^2 (dsigma_s' + dsigma_a), the moves in logarithms.
 MediumChange change_of(const ChannelCoefficients& c,
@@ -147,14 +144,7 @@ Result<FieldBatch> Tangent::solve(const FieldBatch& b, std::stop_token stop) {
   const auto summary = solver_->solve(b, x, {.tolerance = tolerance_}, std::move(stop));
   if (!summary) return summary.error();
   solves_ += b.count;
-  if (summary->termination == diffusion::Termination::kCancelled)
-    return cancelled("diffusion solve");
-  if (!(summary->relative_residual < kUselessResidual)) {
-    return internal_error(
-        fmt::format("diffusion solve stopped at a relative residual of {:.1e}: {}",
-                    summary->relative_residual,
-                    summary->message));
-  }
+  if (auto useful = check_useful(*summary); !useful) return useful.error();
   return x;
 }
 

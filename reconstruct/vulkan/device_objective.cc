@@ -13,7 +13,7 @@ namespace {
 
 using Values = std::vector<float>;
 
-constexpr double kUselessResidual = 1e-3;  // as in reconstruct/objective.cc
+constexpr double kUselessResidual = 1e-3;  // as in reconstruct/solve_check.cc
 constexpr int kMaxIterations = 100;
 
 enum Work : std::size_t {
