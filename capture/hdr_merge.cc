@@ -14,6 +14,10 @@ namespace {
 constexpr double kFullWeight = 0.65;  // of the codes up to clipping: weights fall from here ...
 constexpr double kNoWeight = 0.95;    // ... to here
 constexpr double kSaturated = 0.98;   // clipped, in the shortest exposure
+constexpr double kBelow = 3.0;        // deviations that a mean stays below clipping
+constexpr double kFarBelow = 11.0;    // deviations below it: no question
+constexpr double kDiffers = 4.25;     // deviations from the neighbours' mean: not noise
+constexpr int kFewestAround = 3;
 
 // Of the codes from black to where pixels clip.
 double range_share(const CameraCalibration& camera, double clipping, int code) {
@@ -46,47 +50,89 @@ HdrMerge::HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot)
       hot_(std::move(hot)),
       vignetting_(camera_vignetting(camera)),
       electrons_(electrons_table(camera)),
-      clipping_code_(clipping_code(camera)) {
+      clipping_code_(clipping_code(camera)),
+      clipping_electrons_(electrons_from_code(camera, clipping_code_).signal) {
   ENSURE(hot_.width() == camera.model.width && hot_.height() == camera.model.height);
+}
+
+std::optional<double> HdrMerge::mean_around(const Image<std::uint16_t>& frame,
+                                            int x,
+                                            int y,
+                                            int channel) const {
+  double sum = 0.0;
+  int count = 0;
+  for (int v = std::max(0, y - 1); v <= std::min(frame.height() - 1, y + 1); ++v) {
+    for (int u = std::max(0, x - 1); u <= std::min(frame.width() - 1, x + 1); ++u) {
+      if ((u == x && v == y) || hot_.at(u, v) != 0) continue;
+      sum += electrons_[frame.at(u, v, channel)].signal;
+      ++count;
+    }
+  }
+  return count < kFewestAround ? std::nullopt : std::optional(sum / count);
+}
+
+double HdrMerge::weight_in(const Image<std::uint16_t>& frame, int x, int y, int channel) const {
+  const std::uint16_t code = frame.at(x, y, channel);
+  const Electrons& own = electrons_[code];
+  const double deviation = std::sqrt(noise_variance(camera_, own.signal, own.per_code));
+  if (own.signal + kFarBelow * deviation < clipping_electrons_) return 1.0;
+  const auto around = mean_around(frame, x, y, channel);
+  if (!around || std::abs(own.signal - *around) > kDiffers * deviation)
+    return weight_of(range_share(camera_, clipping_code_, code));
+  const double expected = std::sqrt(noise_variance(camera_, *around, own.per_code));
+  return *around + kBelow * expected < clipping_electrons_ && code < clipping_code_ ? 1.0 : 0.0;
+}
+
+double HdrMerge::variance_of(const Term& t, double rate, double leak_rate) const {
+  const double scale = t.seconds / t.black_seconds;
+  const double mean = (std::max(rate, 0.0) + std::max(leak_rate, 0.0)) * t.seconds;
+  return noise_variance(camera_, mean, t.per_code) +
+         scale * scale * noise_variance(camera_, leak_rate * t.black_seconds, t.black_per_code);
 }
 
 HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
                                         int x,
                                         int y,
                                         int channel) const {
-  struct Term {
-    double weight, seconds, leak, leak_scale, per_code, black_per_code;
-  };
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): filled below
-  std::array<Term, kMaxExposures> terms;
+  std::array<Term, kMaxExposures> all;
   std::size_t count = 0;
   double electrons = 0.0;
   double seconds = 0.0;
+  double leak = 0.0;
+  double black_seconds = 0.0;
   Sample sample;
   for (const ExposurePair& pair : sorted) {
     const std::uint16_t code = pair.light->at(x, y, channel);
-    const double share = range_share(camera_, clipping_code_, code);
     const bool shortest = count == 0;
-    if (shortest) sample.saturated = share >= kSaturated;
-    const double weight = shortest ? 1.0 : weight_of(share);
+    if (shortest) sample.saturated = range_share(camera_, clipping_code_, code) >= kSaturated;
+    const double weight = shortest ? 1.0 : weight_in(*pair.light, x, y, channel);
+    if (weight == 0.0) continue;
     const Electrons& light = electrons_[code];
     const Electrons& black = electrons_[pair.black->at(x, y, channel)];
     const double scale = pair.light_seconds / pair.black_seconds;
-    electrons += weight * (light.signal - black.signal * scale);
+    const double net = light.signal - black.signal * scale;
+    electrons += weight * net;
     seconds += weight * pair.light_seconds;
-    terms[count++] = {
-        weight, pair.light_seconds, black.signal, scale, light.per_code, black.per_code};
+    leak += black.signal;
+    black_seconds += pair.black_seconds;
+    all[count++] = {
+        weight, pair.light_seconds, pair.black_seconds, net, light.per_code, black.per_code};
   }
-  sample.rate = electrons / seconds;
-  double variance = 0.0;
-  for (const Term& t : std::span(terms).first(count)) {
-    const double mean =
-        std::max(sample.rate, 0.0) * t.seconds + std::max(t.leak, 0.0) * t.leak_scale;
-    const double of_light = noise_variance(camera_, mean, t.per_code);
-    const double of_black = noise_variance(camera_, t.leak, t.black_per_code);
-    variance += t.weight * t.weight * (of_light + t.leak_scale * t.leak_scale * of_black);
+  const double leak_rate = leak / black_seconds;
+  const auto terms = std::span(all).first(count);
+  const double first_estimate = electrons / seconds;
+  double sum = 0.0;
+  double total = 0.0;
+  for (Term& t : terms) {
+    t.weight *= t.seconds / variance_of(t, first_estimate, leak_rate);
+    sum += t.weight * t.net;
+    total += t.weight * t.seconds;
   }
-  sample.variance = variance / (seconds * seconds);
+  sample.rate = sum / total;
+  for (const Term& t : terms)
+    sample.variance += t.weight * t.weight * variance_of(t, sample.rate, leak_rate);
+  sample.variance /= total * total;
   return sample;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,16 +27,20 @@ struct HdrImage {
   Image<std::uint8_t> saturated;  ///< 1: some channel clipped even in the shortest exposure
 };
 
-/// Merges a bracket with the Poisson-noise estimator (Hanji, Zhong, Mantiuk 2020, Eq. 9): with
-/// electrons e_i above black and exposure t_i, the rate is
+/// Merges a bracket by maximum likelihood in two steps (compound-Gaussian noise, Granados et al. 2010, Sec. 4): with net
+/// electrons n_i above black, of variance v_i at exposure t_i, the rate is
 ///
-///   sum_i w_i e_i / sum_i w_i t_i
+///   sum_i w_i n_i / sum_i w_i t_i        w_i = t_i / v_i(first estimate)
 ///
-/// so each exposure weighs by its time, which needs no noise parameter and has no bias. w_i falls
-/// linearly from 1 to 0 between 65 % and 95 % of the codes up to clipping (1 throughout in the
-/// shortest exposure): a hard limit on noisy codes would select the low ones. The variance is that of the
-/// sum under the camera's noise model, evaluated at the estimate: shot noise of light and leak,
-/// read noise and quantisation, of both frames of each pair.
+/// where the first estimate is the same sum with w_i = 1, which needs no noise parameter and has no bias (Hanji, Zhong,
+/// Mantiuk 2020, Eq. 9). v_i is the camera's noise model: shot noise of light and leak, read noise and quantisation, of both
+/// frames of the pair, the leak being that of all black frames together, so that no weight follows the noise of its own
+/// black. The variance returned is 1 / sum_i t_i^2 / v_i at the result: the Cramer-Rao bound of the exposures used.
+///
+/// Whether an exposure is used must not depend on the noise of what it would add, or low codes are selected. So a sample
+/// near clipping is judged by the mean of its eight neighbours in the same frame: used where that mean and three
+/// standard deviations stay below clipping. Where the sample differs from it by more than noise, as at edges, w_i falls
+/// linearly with the sample's own code from 65 % to 95 % of the codes up to clipping. The shortest exposure is always used.
 class HdrMerge {
  public:
   /// `hot` marks pixels (1) to leave out.
@@ -49,12 +54,22 @@ class HdrMerge {
     double variance = 0.0;
     bool saturated = false;
   };
+  struct Term {
+    double weight, seconds, black_seconds, net, per_code, black_per_code;
+  };
   Sample merge_sample(std::span<const ExposurePair> sorted, int x, int y, int channel) const;
+  double weight_in(const Image<std::uint16_t>& frame, int x, int y, int channel) const;
+  std::optional<double> mean_around(const Image<std::uint16_t>& frame,
+                                    int x,
+                                    int y,
+                                    int channel) const;
+  double variance_of(const Term& term, double rate, double leak_rate) const;
   CameraCalibration camera_;
   Image<std::uint8_t> hot_;
   Image<float> vignetting_;
   std::vector<Electrons> electrons_;  // by code
   double clipping_code_;
+  double clipping_electrons_;
 };
 
 /// Light of one exposure above black, over the pixels where `footprint` is 1. Samples whose black
