@@ -77,6 +77,7 @@ const std::map<std::string, std::vector<std::string>> kOnlyUsers{
     {"oneapi/", {"base/io"}},
     {"curl/", {"daemon"}},
     {"openssl/", {"base"}},
+    {"libusb-1.0/", {"drivers"}},
     {"zlib.h", {"base"}},
 };
 
