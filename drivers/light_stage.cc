@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 namespace opaline::drivers {
 
 Result<void> check(const StagePattern& pattern, const LightStageInfo& info) {
@@ -13,10 +11,6 @@ Result<void> check(const StagePattern& pattern, const LightStageInfo& info) {
                                         pattern.id,
                                         pattern.codes.size(),
                                         info.lights.size()));
-  const auto highest = std::ranges::max_element(pattern.codes);
-  if (highest != pattern.codes.end() && *highest > info.max_code)
-    return invalid_argument(
-        fmt::format("pattern {}: code {}; expected 0 to {}", pattern.id, *highest, info.max_code));
   if (pattern.polarization != Polarization::kCross && !info.turns_polarizer)
     return invalid_argument(
         fmt::format("pattern {}: parallel polarisation; expected crossed, since the stage cannot "

@@ -19,7 +19,6 @@ struct LightStageInfo {
   std::string model;
   std::string serial;
   std::vector<SphereLight> lights;  ///< where they are, and how bright at full code
-  int max_code = 255;               ///< light is proportional to the code
   std::chrono::nanoseconds
       period{};  ///< of the lamps' dimming: exposures are whole multiples of it
   std::chrono::nanoseconds latency{};  ///< from set() to light, at most
@@ -28,8 +27,8 @@ struct LightStageInfo {
 
 /// What all lights are to do at once.
 struct StagePattern {
-  std::uint64_t id = 0;  ///< > 0, unique within a session
-  std::vector<std::uint16_t> codes;
+  std::uint64_t id = 0;             ///< > 0, unique within a session
+  std::vector<std::uint8_t> codes;  ///< 0 to 255, light is proportional
   Polarization polarization = Polarization::kCross;
   std::string name = {};  ///< for people
 };
@@ -45,7 +44,7 @@ struct StagePattern {
 /// Threads: one caller at a time; blank() may come from any thread, and a set() that it overtakes ends dark.
 /// Waits:   blank() at most 1 s, every other call 2 s, then kTimeout; a stop request ends set() with kCancelled within 300 ms, dark or
 ///          with the old pattern.
-/// Errors:  kInvalidArgument for a pattern of the wrong size, codes too high, id 0, or a polarisation that the stage cannot turn to;
+/// Errors:  kInvalidArgument for a pattern of the wrong size, id 0, or a polarisation that the stage cannot turn to;
 ///          kUnavailable while closed, when lost (the lights are in no known state), or blanked by somebody else; kNotFound where no
 ///          such device exists; kCancelled for a set() that blank() overtook.
 class LightStage {

@@ -3,51 +3,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "sim/ball_walk.h"
 #include "sim/fresnel.h"
 
 namespace opaline::sim {
 namespace {
 
 constexpr std::int64_t kBatch = 4096;  // paths, each from its own stratum of the cosine
-constexpr double kFaint = 0.05;        // weight below which a path plays for its life
-constexpr double kSurvival = 0.25;
-
-struct Vector {
-  double x;
-  double y;
-  double z;
-};
-
-double dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vector along(const Vector& a, double s, const Vector& b) {
-  return {a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
-}
-
-/// splitmix64 (Steele et al. 2014).
-class Numbers {
- public:
-  explicit Numbers(std::uint64_t seed) : state_(seed) {}
-  double next() {  // in (0, 1)
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15ULL;
-    z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
-    z ^= z >> 31U;
-    return (static_cast<double>(z >> 11U) + 0.5) * 0x1p-53;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
-Vector isotropic(Numbers& numbers) {
-  const double z = 2.0 * numbers.next() - 1.0;
-  const double turn = 2.0 * std::numbers::pi * numbers.next();
-  const double s = std::sqrt(1.0 - z * z);
-  return {s * std::cos(turn), s * std::sin(turn), z};
-}
 
 struct Sums {
   double constant = 0.0;
@@ -56,52 +20,25 @@ struct Sums {
 
 class Tracer {
  public:
-  explicit Tracer(const Ball& ball) : ball_(ball) {}
+  explicit Tracer(const Ball& ball) : ball_(ball), walk_(ball) {}
 
   /// One path that enters at the pole from a direction of this cosine.
-  void trace(double cosine, Numbers& numbers, Sums& sums) const {
+  void trace(double cosine, PathNumbers& numbers, Sums& sums) const {
     const double sine = std::sqrt(1.0 - cosine * cosine);
-    const Vector light{sine, 0.0, cosine};
+    const Vec3 light{sine, 0.0, cosine};
     const double bent = sine / ball_.ior;
-    Vector at{0.0, 0.0, ball_.radius};
-    Vector way{-bent, 0.0, -std::sqrt(1.0 - bent * bent)};
-    double weight = 1.0 - reflectance(cosine, 1.0, ball_.ior);
-    for (int collisions = 0; weight > 0.0;) {
-      const double free = -std::log(numbers.next());
-      const double out = to_surface(at, way);
-      if (free < out) {
-        at = along(at, free, way);
-        way = isotropic(numbers);
-        weight *= ball_.reduced_albedo;
-        ++collisions;
-        if (weight < kFaint) weight = numbers.next() < kSurvival ? weight / kSurvival : 0.0;
-        continue;
-      }
-      at = along(at, out, way);
-      const double inverse = 1.0 / std::sqrt(dot(at, at));
-      const Vector normal{at.x * inverse, at.y * inverse, at.z * inverse};
-      const double leaving = std::min(1.0, dot(way, normal));
-      if (numbers.next() < reflectance(leaving, ball_.ior, 1.0)) {
-        way = along(way, -2.0 * leaving, normal);
-        continue;
-      }
-      if (collisions > 1) {
-        sums.constant += weight;
-        sums.gradient += weight * dot(light, normal);
-      }
-      return;
-    }
+    const auto exit = walk_.walk({0.0, 0.0, ball_.radius},
+                                 {-bent, 0.0, -std::sqrt(1.0 - bent * bent)},
+                                 1.0 - reflectance(cosine, 1.0, ball_.ior),
+                                 numbers);
+    if (!exit || exit->collisions < 2) return;
+    sums.constant += exit->weight;
+    sums.gradient += exit->weight * dot(light, exit->normal);
   }
 
  private:
-  double to_surface(const Vector& at, const Vector& way) const {
-    const double towards = dot(at, way);
-    const double inside = ball_.radius * ball_.radius - dot(at, at);
-    const double root = std::sqrt(std::max(0.0, towards * towards + inside));
-    return towards > 0.0 ? std::max(0.0, inside) / (root + towards) : root - towards;
-  }
-
   Ball ball_;
+  BallWalk walk_;
 };
 
 Result<void> check(const Ball& ball, std::int64_t paths) {
@@ -151,7 +88,7 @@ Result<BallLight> trace_ball(const Ball& ball,
   std::vector<Sums> batches(static_cast<std::size_t>((paths + kBatch - 1) / kBatch));
   team.run([&](int thread) {
     for (std::size_t b = thread; b < batches.size(); b += team.size()) {
-      Numbers numbers(seed * 0x2545f4914f6cdd1dULL + b * 0xd1342543de82ef95ULL);
+      PathNumbers numbers(seed * 0x2545f4914f6cdd1dULL + b * 0xd1342543de82ef95ULL);
       Sums sums;
       for (std::int64_t n = 0; n < kBatch; ++n) {
         const double share = (static_cast<double>(n) + numbers.next()) / kBatch;

@@ -73,6 +73,8 @@ struct ProjectorOptics {
   Rgb peak_irradiance{1e-3, 1e-3, 1e-3};  ///< at code 255 in the middle, W/mm^2, mean over a turn
   std::chrono::nanoseconds latency = std::chrono::milliseconds(50);  ///< from show() to light
   std::chrono::nanoseconds wheel_turn = std::chrono::nanoseconds(33'333'333);  ///< 1/30 s
+  bool color_wheel = true;      ///< false: all channels shine all the time, as a light stage's do
+  double drift_per_hour = 0.0;  ///< relative, of the light, on the rig's clock
 };
 Result<void> validate(const ProjectorOptics& options);
 

@@ -32,6 +32,14 @@ std::uint64_t content_hash(const Image<std::uint8_t>& codes) {
   return hash;
 }
 
+/// For how long each channel is lit at full power.
+Rgb lit_seconds(const ProjectorOptics& projector, double phase, const LightStretch& stretch) {
+  const double all = stretch.to_seconds - stretch.from_seconds;
+  if (!projector.color_wheel) return {all, all, all};
+  return wheel_lit_seconds(
+      seconds(projector.wheel_turn), phase + stretch.from_seconds, phase + stretch.to_seconds);
+}
+
 /// Responses hold for one place of the camera; within a hundredth of its distance the picture is the same.
 Result<void> check_view(const TransportResponses& r, const CameraModel& camera) {
   const Vec3 middle = r.block.face_cell_centre(
@@ -77,16 +85,24 @@ Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
   if (auto good = validate(options); !good) return good.error().in("rig");
   if (auto good = check(*responses, options.camera.model); !good)
     return good.error().in("transport responses");
-  return std::unique_ptr<Rig>(new Rig(options, std::move(responses), clock));
+  return create(options,
+                std::make_shared<const StationOptics>(
+                    options.camera, options.projector, std::move(responses)),
+                clock);
 }
 
-Rig::Rig(const RigOptions& options,
-         std::shared_ptr<const TransportResponses> responses,
-         Clock* clock)
+Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
+                                         std::shared_ptr<const LightPath> path,
+                                         Clock* clock) {
+  if (auto good = validate(options); !good) return good.error().in("rig");
+  return std::unique_ptr<Rig>(new Rig(options, std::move(path), clock));
+}
+
+Rig::Rig(const RigOptions& options, std::shared_ptr<const LightPath> path, Clock* clock)
     : options_(options),
       own_clock_(options.time_factor),
       clock_(clock == nullptr ? *own_clock_ : *clock),
-      optics_(options.camera, options.projector, std::move(responses)),
+      path_(std::move(path)),
       sensor_(options.camera, options.seed),
       next_session_(
           static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count())) {
@@ -171,7 +187,7 @@ Shown Rig::render(const drivers::Pattern& pattern) {
         return std::make_shared<ShownPattern>(ShownPattern{pattern.id, content, light});
     }
   }
-  auto light = std::make_shared<const StationLight>(optics_.light(pattern.codes));
+  auto light = std::make_shared<const StationLight>(path_->light(pattern.codes));
   const std::lock_guard lock(mutex_);
   rendered_.emplace_back(content, light);
   if (rendered_.size() > kRenderedKept) rendered_.pop_front();
@@ -321,8 +337,9 @@ Image<std::uint16_t> Rig::picture(const Exposure& exposure,
   Image<float> sum(options_.camera.model.width, options_.camera.model.height, 3);
   for (const LightStretch& stretch : lights) {
     if (!stretch.shown) continue;
-    const Rgb lit =
-        wheel_lit_seconds(turn, phase + stretch.from_seconds, phase + stretch.to_seconds);
+    Rgb lit = lit_seconds(options_.projector, phase, stretch);
+    const double hours = seconds(exposure.start) / 3600.0;
+    for (double& channel : lit) channel *= 1.0 + options_.projector.drift_per_hour * hours;
     const std::span<const float> radiance = stretch.shown->light->sensor_radiance.samples();
     for (std::size_t i = 0; i < radiance.size(); ++i) {
       sum.samples()[i] += static_cast<float>(lit[i % 3]) * radiance[i];
@@ -382,15 +399,13 @@ Result<RigStatus> Rig::status() {
 Result<RigTruth> Rig::truth() {
   const std::lock_guard lock(mutex_);
   const Shown shown = timeline_.at(clock_.now());
-  const TransportResponses& responses = optics_.responses();
-  RigTruth truth{.scene = responses.scene,
+  StationLight dark = path_->dark();
+  RigTruth truth{.scene = path_->scene(),
                  .pattern_id = shown ? shown->id : 0,
-                 .patches_x = responses.patches_x,
-                 .patches_y = responses.patches_y,
-                 .patch_irradiance = std::vector<Rgb>(responses.patches.size(), Rgb{}),
-                 .surface_radiance = Image<float>(responses.block.face_width(responses.seen_face),
-                                                  responses.block.face_height(responses.seen_face),
-                                                  3)};
+                 .patches_x = path_->patches_x(),
+                 .patches_y = path_->patches_y(),
+                 .patch_irradiance = std::move(dark.patch_irradiance),
+                 .surface_radiance = std::move(dark.surface_radiance)};
   if (shown) {
     truth.patch_irradiance = shown->light->patch_irradiance;
     truth.surface_radiance = shown->light->surface_radiance;

@@ -40,6 +40,10 @@ class Rig : public RigPort {
   static Result<std::unique_ptr<Rig>> create(const RigOptions& options,
                                              std::shared_ptr<const TransportResponses> responses,
                                              Clock* clock = nullptr);
+  /// The same over another light path: a light stage is a projector of its pictures' size (drivers/stage_picture.h).
+  static Result<std::unique_ptr<Rig>> create(const RigOptions& options,
+                                             std::shared_ptr<const LightPath> path,
+                                             Clock* clock = nullptr);
 
   Result<Opened<drivers::CameraInfo>> open_camera() override;
   Result<Opened<drivers::ProjectorInfo>> open_projector() override;
@@ -58,7 +62,7 @@ class Rig : public RigPort {
   Result<void> add(const Faults& faults) override;
 
  private:
-  Rig(const RigOptions& options, std::shared_ptr<const TransportResponses> responses, Clock* clock);
+  Rig(const RigOptions& options, std::shared_ptr<const LightPath> path, Clock* clock);
 
   struct Exposure;
   Result<Exposure> trigger(std::uint64_t session,
@@ -76,7 +80,7 @@ class Rig : public RigPort {
   const RigOptions options_;
   std::optional<SystemClock> own_clock_;
   Clock& clock_;
-  const StationOptics optics_;
+  const std::shared_ptr<const LightPath> path_;
   const Sensor sensor_;
 
   mutable std::mutex mutex_;  // guards all below

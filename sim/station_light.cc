@@ -181,6 +181,14 @@ StationLight StationOptics::light(const Image<std::uint8_t>& codes) const {
   return light;
 }
 
+StationLight StationOptics::dark() const {
+  const Block& block = responses_->block;
+  const Face face = responses_->seen_face;
+  return {std::vector<Rgb>(responses_->patches.size(), Rgb{}),
+          Image<float>(block.face_width(face), block.face_height(face), 3),
+          {}};
+}
+
 Image<float> StationOptics::surface(const std::vector<Rgb>& patch_irradiance) const {
   const Block& block = responses_->block;
   const Face face = responses_->seen_face;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "base/image.h"
@@ -17,19 +18,34 @@ struct StationLight {
   Image<float> sensor_radiance;   ///< the same as each camera pixel sees it, PSF included
 };
 
+/// From what the light source is told to what the camera's pixels see. Const calls from any thread.
+class LightPath {
+ public:
+  virtual ~LightPath() = default;
+  virtual StationLight light(const Image<std::uint8_t>& codes) const = 0;
+  /// What `light` gives in its first two fields when all is dark.
+  virtual StationLight dark() const = 0;
+  virtual int patches_x() const = 0;  ///< of patch_irradiance
+  virtual int patches_y() const = 0;
+  virtual std::string scene() const = 0;  ///< what is looked at, as JSON
+};
+
 /// Follows light from the projector through the sample to the camera's pixels: patch irradiances
 /// weight the stored responses (light adds), and every pixel averages the surface cells that its
 /// area sees. Around the seen face, the block's other sides included, the camera sees black.
 ///
 /// Threads: const, so any number at a time.
-class StationOptics {
+class StationOptics : public LightPath {
  public:
   StationOptics(const CameraOptics& camera,
                 const ProjectorOptics& projector,
                 std::shared_ptr<const TransportResponses> responses);
 
-  StationLight light(const Image<std::uint8_t>& codes) const;
-  const TransportResponses& responses() const { return *responses_; }
+  StationLight light(const Image<std::uint8_t>& codes) const override;
+  StationLight dark() const override;
+  int patches_x() const override { return responses_->patches_x; }
+  int patches_y() const override { return responses_->patches_y; }
+  std::string scene() const override { return responses_->scene; }
 
  private:
   Image<float> surface(const std::vector<Rgb>& patch_irradiance) const;

@@ -55,7 +55,6 @@ LightStageInfo UdmxStage::describe() const {
   return {"uDMX",
           places,
           options_.lights,
-          255,
           options_.period,
           options_.latency,
           options_.polarizer_channel > 0};
@@ -151,7 +150,7 @@ std::vector<UdmxStage::Values> UdmxStage::values_of(const StagePattern& pattern)
   for (std::size_t n = 0; n < pattern.codes.size(); ++n)
     for (std::size_t c = 0; c < per_light; ++c)
       put(static_cast<std::size_t>(options_.first_channel - 1) + n * per_light + c,
-          static_cast<std::uint8_t>(pattern.codes[n]));
+          pattern.codes[n]);
   if (options_.polarizer_channel > 0)
     put(static_cast<std::size_t>(options_.polarizer_channel - 1),
         pattern.polarization == Polarization::kCross ? options_.cross_code

@@ -25,6 +25,8 @@ struct StageDriver {
   std::function<std::unique_ptr<StageBench>()> make;
 };
 
-std::unique_ptr<StageBench> make_udmx_bench();  ///< two interfaces whose firmware is played
+std::unique_ptr<StageBench> make_udmx_bench();          ///< two interfaces whose firmware is played
+std::unique_ptr<StageBench> make_sim_stage_bench();     ///< the simulated sphere in this process
+std::unique_ptr<StageBench> make_socket_stage_bench();  ///< the same behind a socket
 
 }  // namespace opaline::conformance

@@ -21,8 +21,8 @@ UdmxOptions options_of(std::size_t lights) {
   return options;
 }
 
-StagePattern pattern_of(std::size_t lights, std::uint16_t code, std::uint64_t id = 1) {
-  return {id, std::vector<std::uint16_t>(lights, code)};
+StagePattern pattern_of(std::size_t lights, std::uint8_t code, std::uint64_t id = 1) {
+  return {id, std::vector<std::uint8_t>(lights, code)};
 }
 
 /// bRequest, wValue, wIndex, and the data, as they went over the wire.
@@ -101,8 +101,8 @@ TEST(UdmxStage, NothingButTheTwoRequestsIsEverSent) {
   FakeUdmx world({"1-1"});
   UdmxStage stage(options_of(156), world.bus());
   ASSERT_TRUE(stage.open());
-  for (std::uint16_t code = 0; code < 256; ++code)
-    ASSERT_TRUE(stage.set(pattern_of(156, code), {}));
+  for (int code = 0; code < 256; ++code)
+    ASSERT_TRUE(stage.set(pattern_of(156, static_cast<std::uint8_t>(code)), {}));
   ASSERT_TRUE(stage.blank());
   stage.close();
   for (const auto& write : world.take_writes()) {

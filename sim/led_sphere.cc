@@ -1,0 +1,246 @@
+#include "sim/led_sphere.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <thread>
+
+#include "sim/fresnel.h"
+#include "sim/options_check.h"
+#include "sim/sensor.h"
+
+namespace opaline::sim {
+namespace {
+
+using std::numbers::pi;
+
+double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albedo)); }
+
+/// Where a ray first meets a ball; the distance along it.
+std::optional<double> meet(Vec3 from, Vec3 way, const BallTruth& ball) {
+  const Vec3 to = ball.centre - from;
+  const double along = dot(to, way);
+  const double missed = dot(to, to) - along * along;
+  const double inside = ball.radius_mm * ball.radius_mm - missed;
+  if (inside <= 0.0 || along <= 0.0) return std::nullopt;
+  return along - std::sqrt(inside);
+}
+
+double ggx(double cosine, double alpha) {
+  const double a = alpha * alpha;
+  const double b = cosine * cosine * (a - 1.0) + 1.0;
+  return a / (pi * b * b);
+}
+
+double smith(double cosine, double alpha) {
+  const double tangent = (1.0 - cosine * cosine) / (cosine * cosine);
+  return 2.0 / (1.0 + std::sqrt(1.0 + alpha * alpha * tangent));
+}
+
+}  // namespace
+
+Result<void> validate(const LedSphereOptions& o, std::size_t lights) {
+  if (o.radii_mm.empty() || o.radii_mm.size() > 8)
+    return invalid_argument(fmt::format("{} balls; expected 1 to 8", o.radii_mm.size()));
+  OptionsCheck check;
+  for (const double radius : o.radii_mm) check.above("radii", radius, 0.0);
+  check.at_least("gap", o.gap_mm, 0.0);
+  for (std::size_t c = 0; c < 3; ++c) {
+    check.within("reduced_albedo", o.reduced_albedo[c], 0.0, 0.99999);
+    check.above("translucency", o.translucency_mm[c], 0.0);
+  }
+  check.within("ior", o.ior, 1.0, 3.0).within("roughness", o.roughness, 0.02, 1.0);
+  check.within("depolarised", o.depolarised, 0.0, 1.0);
+  check.within("intensity_error", o.intensity_error, 0.0, 0.3);
+  check.at_least("paths", static_cast<double>(o.paths), 10'000.0);
+  for (const int dead : o.dead_lights)
+    check.within("dead_lights", dead, 0, static_cast<double>(lights) - 1.0);
+  return check.result();
+}
+
+std::vector<BallTruth> balls_of(const LedSphereOptions& options) {
+  double width = options.gap_mm * static_cast<double>(options.radii_mm.size() - 1);
+  for (const double radius : options.radii_mm) width += 2.0 * radius;
+  std::vector<BallTruth> balls;
+  double left = -0.5 * width;
+  for (const double radius : options.radii_mm) {
+    balls.push_back({{left + radius, 0.0, 0.0}, radius});
+    left += 2.0 * radius + options.gap_mm;
+  }
+  return balls;
+}
+
+double diffusion_of(double reduced_albedo, double translucency_mm) {
+  return decay(reduced_albedo) * translucency_mm / 3.0;
+}
+
+LedSphere::LedSphere(const LedSphereOptions& options,
+                     const std::vector<SphereLight>& lights,
+                     const CameraOptics& camera)
+    : options_(options),
+      lights_(lights),
+      balls_(balls_of(options)),
+      width_(camera.model.width),
+      height_(camera.model.height),
+      psf_sigma_px_(camera.psf_sigma_px) {
+  for (std::size_t n = 0; n < lights_.size(); ++n) {
+    const double z = normal_quantile(uniform(mix(mix(options.seed, 0x6c656473), n)));
+    lights_[n].intensity *= std::max(0.0, 1.0 + options.intensity_error * z);
+  }
+  for (const int dead : options.dead_lights)
+    lights_[static_cast<std::size_t>(dead)].intensity = 0.0;
+  look(camera);
+}
+
+void LedSphere::look(const CameraOptics& camera) {
+  const Vec3 eye = camera.model.centre();
+  for (int y = 0; y < height_; ++y)
+    for (int x = 0; x < width_; ++x) {
+      const Vec3 way = normalized(camera.model.ray_direction({x + 0.5, y + 0.5}));
+      std::optional<double> nearest;
+      std::size_t hit = 0;
+      for (std::size_t b = 0; b < balls_.size(); ++b) {
+        const auto met = meet(eye, way, balls_[b]);
+        if (!met || (nearest && *nearest < *met)) continue;
+        nearest = met;
+        hit = b;
+      }
+      if (!nearest) continue;
+      const Vec3 point = eye + way * *nearest;
+      seen_.push_back({static_cast<std::uint32_t>(y * width_ + x),
+                       static_cast<std::uint32_t>(hit),
+                       point,
+                       normalized(point - balls_[hit].centre),
+                       way * -1.0});
+    }
+}
+
+Result<std::unique_ptr<const LedSphere>> LedSphere::create(const LedSphereOptions& options,
+                                                           const std::vector<SphereLight>& lights,
+                                                           const CameraOptics& camera,
+                                                           EventSink& events,
+                                                           std::stop_token stop) {
+  if (auto good = validate(options, lights.size()); !good) return good.error().in("led sphere");
+  std::unique_ptr<LedSphere> sphere(new LedSphere(options, lights, camera));
+  double distance = 0.0;  // mean
+  for (const SphereLight& light : lights)
+    distance += length(light.position) / static_cast<double>(lights.size());
+  ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
+  double done = 0.0;
+  for (const BallTruth& ball : sphere->balls_) {
+    Table table{std::vector<float>(3 * (kSteps + 1)), {}};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double free_path = decay(options.reduced_albedo[c]) * options.translucency_mm[c];
+      auto traced =
+          trace_response({options.reduced_albedo[c], ball.radius_mm / free_path, options.ior},
+                         distance / ball.radius_mm,
+                         {.paths = options.paths},
+                         mix(options.seed, c),
+                         team,
+                         stop);
+      if (!traced)
+        return traced.error().in(fmt::format(
+            "ball of {} mm, translucency {} mm", ball.radius_mm, options.translucency_mm[c]));
+      for (std::size_t n = 0; n <= kSteps; ++n)
+        table.exitance[3 * n + c] =
+            static_cast<float>(traced->exitance_at(2.0 * static_cast<double>(n) / kSteps - 1.0));
+      table.responses[c] = *std::move(traced);
+      done += 1.0;
+      events.progress({"light in the balls",
+                       done / (3.0 * static_cast<double>(sphere->balls_.size())),
+                       std::nullopt,
+                       nlohmann::json::object()});
+    }
+    sphere->tables_.push_back(std::move(table));
+  }
+  return std::unique_ptr<const LedSphere>(std::move(sphere));
+}
+
+/// `power` are I code/255.
+Rgb LedSphere::diffuse(const Seen& seen, const std::vector<double>& power) const {
+  const Table& table = tables_[seen.ball];
+  const Vec3 centre = balls_[seen.ball].centre;
+  std::array<float, 3> sum{};
+  for (std::size_t n = 0; n < lights_.size(); ++n) {
+    if (power[n] == 0.0) continue;
+    const Vec3 to = lights_[n].position - centre;
+    const double square = dot(to, to);
+    const double cosine = dot(to, seen.normal) / std::sqrt(square);
+    const double place = (cosine + 1.0) * (0.5 * kSteps);
+    const auto at = std::min(static_cast<std::size_t>(place), kSteps - 1);
+    const auto part = static_cast<float>(place - static_cast<double>(at));
+    const auto weight = static_cast<float>(power[n] / square);
+    const float* entry = &table.exitance[3 * at];
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += weight * (entry[c] + part * (entry[c + 3] - entry[c]));
+  }
+  Rgb radiance{};
+  const double cosine = dot(seen.normal, seen.to_camera);
+  for (std::size_t c = 0; c < 3; ++c)
+    radiance[c] = options_.depolarised / pi * table.responses[c].law_at(cosine) * sum[c];
+  return radiance;
+}
+
+double LedSphere::specular(const Seen& seen, const std::vector<double>& power) const {
+  const double out = dot(seen.normal, seen.to_camera);
+  double sum = 0.0;
+  for (std::size_t n = 0; n < lights_.size(); ++n) {
+    const Vec3 to = lights_[n].position - seen.point;
+    const double square = dot(to, to);
+    const Vec3 way = to * (1.0 / std::sqrt(square));
+    const double in = dot(seen.normal, way);
+    if (in <= 0.0 || out <= 0.0 || power[n] == 0.0) continue;
+    const Vec3 half = normalized(way + seen.to_camera);
+    const double fresnel = reflectance(std::min(1.0, dot(half, way)), 1.0, options_.ior);
+    const double alpha = options_.roughness;
+    sum += power[n] / square * fresnel * ggx(dot(half, seen.normal), alpha) * smith(in, alpha) *
+           smith(out, alpha) / (4.0 * out);
+  }
+  return sum;
+}
+
+StationLight LedSphere::light(const Image<std::uint8_t>& codes) const {
+  StationLight light = dark();
+  std::vector<double> power(lights_.size(), 0.0);
+  for (std::size_t n = 0; n < lights_.size(); ++n) {
+    power[n] = lights_[n].intensity * codes.at(static_cast<int>(n), 0) / 255.0;
+    const double irradiance = power[n] / dot(lights_[n].position, lights_[n].position);
+    light.patch_irradiance[n] = {irradiance, irradiance, irradiance};
+  }
+  const bool parallel = codes.at(static_cast<int>(lights_.size()), 0) != 0;
+  for (const Seen& seen : seen_) {
+    const Rgb radiance = diffuse(seen, power);
+    const double mirrored = parallel ? specular(seen, power) : 0.0;
+    float* const pixel = &light.surface_radiance.samples()[3 * std::size_t{seen.pixel}];
+    for (std::size_t c = 0; c < 3; ++c) pixel[c] = static_cast<float>(radiance[c] + mirrored);
+  }
+  light.sensor_radiance = blurred(light.surface_radiance, psf_sigma_px_);
+  return light;
+}
+
+StationLight LedSphere::dark() const {
+  return {std::vector<Rgb>(lights_.size(), Rgb{}), Image<float>(width_, height_, 3), {}};
+}
+
+std::string LedSphere::scene() const {
+  auto balls = nlohmann::ordered_json::array();
+  for (const BallTruth& ball : balls_)
+    balls.push_back({{"centre_mm", {ball.centre.x, ball.centre.y, ball.centre.z}},
+                     {"radius_mm", ball.radius_mm}});
+  Rgb diffusion{};
+  for (std::size_t c = 0; c < 3; ++c)
+    diffusion[c] = diffusion_of(options_.reduced_albedo[c], options_.translucency_mm[c]);
+  return nlohmann::ordered_json{{"kind", "led_sphere"},
+                                {"balls", balls},
+                                {"reduced_albedo", options_.reduced_albedo},
+                                {"translucency_mm", options_.translucency_mm},
+                                {"diffusion_mm", diffusion},
+                                {"ior", options_.ior}}
+      .dump();
+}
+
+}  // namespace opaline::sim
