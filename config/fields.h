@@ -54,6 +54,11 @@ class Fields {
   Fields& operator=(const Fields&) = delete;
 
   virtual void table(const Key& key, const Visit& visit) = 0;
+  /// An array of tables, [[KEY]]: makes room for as many as there are, then visits each by its place.
+  virtual void tables(const Key& key,
+                      std::size_t count,
+                      const std::function<void(std::size_t)>& make_room,
+                      const std::function<void(Fields&, std::size_t)>& visit) = 0;
   virtual void text(const Key& key, std::string& value) = 0;
   /// Relative to the file it stands in, absolute once read; empty means none.
   virtual void path(const Key& key, std::filesystem::path& value) = 0;
@@ -83,6 +88,14 @@ class Fields {
   virtual bool is_sound() const = 0;
 
   // The same for the types that options have.
+  template <class T, class Visitor>
+  void list(const Key& key, std::vector<T>& items, const Visitor& visitor) {
+    tables(
+        key,
+        items.size(),
+        [&](std::size_t count) { items.assign(count, T{}); },
+        [&](Fields& fields, std::size_t k) { visitor(fields, items[k]); });
+  }
   void number(const Key& key, double& value, Range range = {}) {
     quantity(key, value, Unit::kPlain, range);
   }

@@ -87,6 +87,26 @@ class Reader : public Fields {
     inner.finish();
   }
 
+  void tables(const Key& key,
+              std::size_t /*count*/,
+              const std::function<void(std::size_t)>& make_room,
+              const std::function<void(Fields&, std::size_t)>& visit) override {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const toml::array* found = node->as_array();
+    const std::string name =
+        name_.empty() ? std::string(key.name) : fmt::format("{}.{}", name_, key.name);
+    if (found == nullptr || !found->is_homogeneous(toml::node_type::table)) {
+      return wrong(key, *node, fmt::format("tables, each headed [[{}]]", name));
+    }
+    make_room(found->size());
+    for (std::size_t k = 0; k < found->size(); ++k) {
+      Reader inner(findings_, *(*found)[k].as_table(), fmt::format("{} {}", name, k + 1));
+      visit(inner, k);
+      inner.finish();
+    }
+  }
+
   void text(const Key& key, std::string& value) override {
     if (const toml::node* node = find(key)) {
       if (const auto* found = node->as_string()) {

@@ -36,13 +36,26 @@ std::string toml_number(double value, Unit unit) {
 /// Prints a table's own keys first, then its sub-tables, as TOML wants them.
 class Writer : public Fields {
  public:
-  Writer(std::string name, bool help) : name_(std::move(name)), help_(help) {}
+  Writer(std::string name, bool help, bool one_of_many = false)
+      : name_(std::move(name)), help_(help), one_of_many_(one_of_many) {}
 
   void table(const Key& key, const Visit& visit) override {
     Writer inner(name_.empty() ? std::string(key.name) : fmt::format("{}.{}", name_, key.name),
                  help_);
     visit(inner);
     tables_ += inner.document(help_ ? key.help : "");
+  }
+  void tables(const Key& key,
+              std::size_t count,
+              const std::function<void(std::size_t)>& /*make_room*/,
+              const std::function<void(Fields&, std::size_t)>& visit) override {
+    for (std::size_t k = 0; k < count; ++k) {
+      Writer inner(name_.empty() ? std::string(key.name) : fmt::format("{}.{}", name_, key.name),
+                   help_,
+                   /*one_of_many=*/true);
+      visit(inner, k);
+      tables_ += inner.document(help_ && k == 0 ? key.help : "");
+    }
   }
   void text(const Key& key, std::string& value) override { line(key, toml_string(value)); }
   void path(const Key& key, std::filesystem::path& value) override {
@@ -85,7 +98,11 @@ class Writer : public Fields {
   std::string document(std::string_view help) const {
     std::string out;
     if (!help.empty()) out += fmt::format("\n# {}", help);
-    if (!name_.empty() && (!keys_.empty() || !help.empty())) out += fmt::format("\n[{}]\n", name_);
+    if (one_of_many_) {
+      out += fmt::format("\n[[{}]]\n", name_);
+    } else if (!name_.empty() && (!keys_.empty() || !help.empty())) {
+      out += fmt::format("\n[{}]\n", name_);
+    }
     return out + keys_ + tables_;
   }
 
@@ -101,6 +118,7 @@ class Writer : public Fields {
 
   std::string name_;
   bool help_;
+  bool one_of_many_;
   std::string keys_;
   std::string tables_;
 };

@@ -13,6 +13,7 @@
 #include "config/session_config.h"
 #include "daemon/cli/daemon_client.h"
 #include "daemon/cli/progress_view.h"
+#include "daemon/cli/render.h"
 #include "daemon/cli/run.h"
 #include "daemon/cli/tradeoff.h"
 #include "daemon/executor.h"
@@ -42,6 +43,7 @@ struct Arguments {
   std::filesystem::path programs = program_directory();
   bool local = false;
   TradeoffWish tradeoff;
+  RenderWish render;
 };
 
 int report(const Error& error) {
@@ -271,6 +273,28 @@ void declare_tradeoff(CLI::App& app, Arguments& arguments, int& status_code) {
   sub->callback([&] { status_code = report(become_tradeoff(arguments.programs, wish)); });
 }
 
+void declare_render(CLI::App& app, Arguments& arguments, int& status_code) {
+  RenderWish& wish = arguments.render;
+  CLI::App* sub = app.add_subcommand(
+      "render", "Draw a scene of translucent and opaque objects, without a daemon");
+  sub->add_option("SCENE", wish.scene, "scene.toml (docs/rendering.md)")->required();
+  sub->add_option("--output,-o", wish.outputs, "Picture: .png, .tif or .exr; may be given again")
+      ->required();
+  sub->add_option("--turntable",
+                  wish.turntable,
+                  "This many pictures of the objects' full turn, numbered NAME_000 and on")
+      ->check(CLI::Range(0, 100000));
+  sub->add_option("--stats", wish.stats, "File for the statistics as JSON, in place of text");
+  sub->add_option("--threads", wish.threads, "0: one a processor")->check(CLI::Range(0, 1024));
+  sub->footer(
+      "Ctrl-C stops; a picture is there whole or not at all.\n"
+      "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
+      "  opaline render config/scene_marble_torus.toml --output torus.png\n"
+      "  opaline render scene.toml --output frame.png --output frame.exr --turntable 60\n"
+      "  opaline render scene.toml --output picture.png --stats picture.json");
+  sub->callback([&] { status_code = report(become_render(arguments.programs, wish)); });
+}
+
 void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   app.description(
       "Captures translucent materials: one configuration in, a material and its report out.");
@@ -293,11 +317,13 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
       "  opaline run --local config/sim.toml    without one\n"
       "  opaline check session.toml rig.toml    every problem, with file, line and column\n"
       "  opaline status                         what runs\n"
-      "  opaline watch 20260131-123456-ab12cd-marble");
+      "  opaline watch 20260131-123456-ab12cd-marble\n"
+      "  opaline render config/scene_marble_torus.toml --output torus.png");
   declare_run(app, arguments, status_code);
   declare_questions(app, arguments, status_code);
   declare_deeds(app, arguments, status_code);
   declare_tradeoff(app, arguments, status_code);
+  declare_render(app, arguments, status_code);
 }
 
 int program(int argc, char** argv) {

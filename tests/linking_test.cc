@@ -50,6 +50,7 @@ const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline-guardian", {}},
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},
     {"opaline-reconstruct", join({kPictures, kVolumes, kProcessor})},
+    {"opaline-render", join({kPictures, kVolumes})},
     {"opaline-rig", {}},
     {"opaline-tradeoff", join({kPictures, kVolumes, kProcessor})},
     {"opaline-transport", {}},

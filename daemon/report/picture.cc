@@ -14,12 +14,6 @@ std::uint8_t code(double share) {
   return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
 }
 
-/// IEC 61966-2-1.
-double srgb(double linear) {
-  linear = std::clamp(linear, 0.0, 1.0);
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
-}
-
 /// The stops of the report's diverging scale (plot.cc), -1 to 1.
 Color diverging(double value) {
   constexpr std::array<Color, 7> kStops{Color{33, 102, 172},
@@ -57,6 +51,11 @@ float mean_difference(const Image<float>& a, const Image<float>& b, int x, int y
 }
 
 }  // namespace
+
+double srgb(double linear) {
+  linear = std::clamp(linear, 0.0, 1.0);
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+}
 
 double white_point(const Image<float>& radiance, double quantile) {
   std::vector<float> brightest;

@@ -10,6 +10,9 @@ namespace opaline::daemon {
 /// are lit at all.
 double white_point(const Image<float>& radiance, double quantile);
 
+/// The code of a linear value, 0 to 1, on a display, 0 to 1 (IEC 61966-2-1).
+double srgb(double linear);
+
 /// Linear radiance as an sRGB picture (IEC 61966-2-1), `white` and more as white. 3 channels.
 Image<std::uint8_t> tone_mapped(const Image<float>& radiance, double white);
 

@@ -1,0 +1,20 @@
+#include "daemon/cli/render.h"
+
+#include <fmt/format.h>
+
+#include "daemon/cli/successor.h"
+
+namespace opaline::daemon {
+
+Error become_render(const std::filesystem::path& programs, const RenderWish& wish) {
+  std::vector<std::string> words{"--turntable",
+                                 fmt::format("{}", wish.turntable),
+                                 "--threads",
+                                 fmt::format("{}", wish.threads)};
+  for (const std::string& output : wish.outputs) words.insert(words.end(), {"--output", output});
+  if (!wish.stats.empty()) words.insert(words.end(), {"--stats", wish.stats});
+  words.insert(words.end(), {"--", wish.scene});
+  return become(programs / "opaline-render", std::move(words));
+}
+
+}  // namespace opaline::daemon

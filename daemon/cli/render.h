@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace opaline::daemon {
+
+/// `opaline render`: what is passed on to opaline-render.
+struct RenderWish {
+  std::string scene;
+  std::vector<std::string> outputs;
+  int turntable = 0;  ///< pictures of one turn; 0: one picture, as the scene stands
+  std::string stats;  ///< file; empty: for people, to standard error
+  int threads = 0;    ///< 0: one a processor
+};
+
+/// Becomes `programs`/opaline-render. Errors: kUnavailable when the program is not there.
+Error become_render(const std::filesystem::path& programs, const RenderWish& wish);
+
+}  // namespace opaline::daemon

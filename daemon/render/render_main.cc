@@ -1,0 +1,165 @@
+// opaline-render: pictures of a scene file.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include "base/clock.h"
+#include "base/files.h"
+#include "base/log.h"
+#include "config/scene_config.h"
+#include "daemon/cli/progress_view.h"
+#include "daemon/cli/terminal.h"
+#include "daemon/jobs/program.h"
+#include "daemon/jobs/stop_signals.h"
+#include "daemon/jobs/version.h"
+#include "daemon/render/developed_picture.h"
+#include "daemon/render/render_report.h"
+#include "daemon/render/turntable.h"
+#include "render/scene/scene_renderer.h"
+
+namespace opaline::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using render::SceneRenderer;
+
+struct Arguments {
+  fs::path scene;
+  std::vector<fs::path> outputs;
+  int turntable = 0;
+  fs::path stats;
+  int threads = 0;
+};
+
+struct Output {
+  fs::path file;
+  ImageFormat format;
+};
+
+Result<std::vector<Output>> outputs_of(const Arguments& arguments) {
+  std::vector<Output> outputs;
+  for (const fs::path& file : arguments.outputs) {
+    const auto format = image_format_of(file.string());
+    if (!format) return format.error();
+    const fs::path directory = fs::absolute(file).parent_path();
+    std::error_code none;
+    if (!fs::is_directory(directory, none)) {
+      return not_found(fmt::format("{}: no such directory", directory.string()));
+    }
+    outputs.push_back({file, *format});
+  }
+  return outputs;
+}
+
+class Session {
+ public:
+  Session(const Arguments& arguments, render::Scene scene, std::vector<Output> outputs)
+      : arguments_(arguments), scene_(std::move(scene)), outputs_(std::move(outputs)) {}
+
+  Result<void> run(ThreadTeam& team, const std::stop_token& stop) {
+    const auto renderer = SceneRenderer::create(
+        scene_, team, [&](std::string_view what, double share) { show(what, 0.5 * share); }, stop);
+    if (!renderer) return renderer.error().in(arguments_.scene.string());
+    const int pictures = std::max(1, arguments_.turntable);
+    for (int k = 0; k < pictures; ++k) {
+      show(fmt::format("picture {} of {}", k + 1, pictures), 0.5 + 0.5 * k / pictures);
+      if (auto drawn = picture(**renderer, k, pictures, stop); !drawn) return drawn;
+    }
+    return report((*renderer)->statistics());
+  }
+
+ private:
+  void show(std::string_view step, double fraction) {
+    view_.on_event("progress", {{"step", step}, {"fraction", fraction}});
+  }
+
+  Result<void> picture(SceneRenderer& renderer, int k, int pictures, const std::stop_token& stop) {
+    const TurnedView turn = turned(scene_, 360.0 * k / pictures);
+    if (auto lit = renderer.light(turn.lights, stop); !lit) return lit;
+    const auto radiance = renderer.draw(render::camera_of(turn.camera, scene_.picture), stop);
+    if (!radiance) return radiance.error();
+    if (k == 0) white_ = white_of(*radiance, scene_.picture);
+    for (const Output& output : outputs_) {
+      const auto bytes = developed(*radiance, white_, scene_.picture, output.format);
+      if (!bytes) return bytes.error().in(output.file.string());
+      const fs::path file = numbered(output.file, k, pictures);
+      if (auto written = write_whole(system_files(), file, *bytes); !written) return written;
+      view_.say(fmt::format("picture  {}", file.string()));
+    }
+    return ok();
+  }
+
+  Result<void> report(const render::SceneStatistics& statistics) {
+    if (arguments_.stats.empty()) {
+      std::fflush(stdout);
+      fmt::print(stderr, "{}white: {:.4g} W/(mm^2 sr)\n", to_text(statistics), white_);
+      return ok();
+    }
+    nlohmann::json json = to_json(statistics);
+    json["white"] = white_;
+    json["scene"] = scene_.name;
+    return write_whole(system_files(), arguments_.stats, json.dump(2) + "\n");
+  }
+
+  const Arguments& arguments_;
+  render::Scene scene_;
+  std::vector<Output> outputs_;
+  SystemClock clock_;
+  ProgressView view_{terminal_options(), clock_};
+  double white_ = 1.0;
+};
+
+Result<void> run(const Arguments& arguments) {
+  auto outputs = outputs_of(arguments);
+  if (!outputs) return outputs.error();
+  auto scene = config::load_scene(arguments.scene);
+  if (!scene) return scene.error();
+  std::stop_source stop;
+  const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
+  if (!signals) return signals.error();
+  const auto processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  ThreadTeam team(arguments.threads > 0 ? arguments.threads : processors);
+  return Session(arguments, *std::move(scene), *std::move(outputs)).run(team, stop.get_token());
+}
+
+int program(int argc, char** argv) {
+  CLI::App app("Draws a scene of translucent and opaque objects.");
+  Arguments arguments;
+  app.add_option("SCENE", arguments.scene, "scene.toml (docs/rendering.md)")->required();
+  app.add_option(
+         "--output,-o", arguments.outputs, "Picture: .png, .tif or .exr; may be given again")
+      ->required();
+  app.add_option("--turntable",
+                 arguments.turntable,
+                 "This many pictures of the objects' full turn, numbered NAME_000 and on")
+      ->check(CLI::Range(0, 100000));
+  app.add_option("--stats", arguments.stats, "File for the statistics as JSON, in place of text");
+  app.add_option("--threads", arguments.threads, "0: one a processor")->check(CLI::Range(0, 1024));
+  app.set_version_flag("--version", fmt::format("opaline-render {}", version()));
+  app.footer(
+      "Ctrl-C stops; a picture is there whole or not at all.\n"
+      "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
+      "  opaline-render config/scene_marble_torus.toml --output torus.png\n"
+      "  opaline-render scene.toml --output frame.png --output frame.exr --turntable 60");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : status_of(ProgramExit::kBadInput);
+  }
+  log::set_level(log::Level::kWarning);
+  const auto done = run(arguments);
+  if (!done) fmt::print(stderr, "opaline-render: {}\n", done.error().message);
+  return status_of(done);
+}
+
+}  // namespace
+}  // namespace opaline::daemon
+
+int main(int argc, char** argv) {
+  return opaline::daemon::run_program(argc, argv, opaline::daemon::program);
+}

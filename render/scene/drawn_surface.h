@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "render/graph/optics.h"
+#include "render/mesh/signed_distance.h"
+#include "render/mesh/triangle_mesh.h"
+
+namespace opaline::render {
+
+/// A surface made finer for the eye: each triangle cut into four, as often as asked, the new corners moved onto the
+/// solid's own surface along the gradient of its signed distance, but by no more than half an edge.
+class DrawnSurface {
+ public:
+  DrawnSurface(TriangleMesh coarse, const SignedDistance& solid, int refinement);
+  /// As it is, where there is no solid to follow.
+  explicit DrawnSurface(TriangleMesh mesh);
+
+  const TriangleMesh& mesh() const { return mesh_; }
+  /// Of each vertex: of the signed distance, else of the triangles around it.
+  const std::vector<Vec3>& normals() const { return normals_; }
+  /// Values of the coarse vertices on all of them: a new vertex has the mean of the two it lies between.
+  SurfaceLight spread(const SurfaceLight& of_coarse) const;
+
+ private:
+  void refine(const SignedDistance& solid);
+
+  TriangleMesh mesh_;
+  std::vector<Vec3> normals_;
+  std::size_t coarse_ = 0;
+  std::vector<std::array<int, 2>> parents_;  // of the vertices after the coarse ones
+};
+
+}  // namespace opaline::render

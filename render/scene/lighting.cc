@@ -1,0 +1,64 @@
+#include "render/scene/lighting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace opaline::render {
+namespace {
+
+double within_cone(const LightOptions& light, Vec3 towards) {
+  const double cosine = -dot(normalized(light.direction), towards);
+  const double angle = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+  if (angle >= light.cone_degrees) return 0.0;
+  if (angle <= light.cone_degrees - light.blur_degrees) return 1.0;
+  const double t = (light.cone_degrees - angle) / light.blur_degrees;
+  return t * t * (3.0 - 2.0 * t);
+}
+
+}  // namespace
+
+bool is_black(const Colour& colour) { return std::ranges::max(colour) <= 0.0; }
+
+LightSample sample(const LightOptions& light, Vec3 place) {
+  LightSample found;
+  if (light.kind == LightOptions::Kind::kDirectional) {
+    found.towards = normalized(light.direction) * -1.0;
+    found.irradiance = light.irradiance;
+    return found;
+  }
+  const Vec3 way = light.position - place;
+  found.distance = length(way);
+  if (!(found.distance > 0.0)) return found;
+  found.towards = way * (1.0 / found.distance);
+  const double share =
+      light.kind == LightOptions::Kind::kSpot ? within_cone(light, found.towards) : 1.0;
+  for (int c = 0; c < 3; ++c) {
+    found.irradiance[c] = share * light.intensity[c] / (found.distance * found.distance);
+  }
+  return found;
+}
+
+std::vector<Vec3> cosine_directions(int count) {
+  static const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
+  std::vector<Vec3> directions;
+  directions.reserve(count);
+  for (int k = 0; k < count; ++k) {
+    const double square = (k + 0.5) / count;  // of the sine
+    const double sine = std::sqrt(square);
+    directions.push_back(
+        {sine * std::cos(golden * k), sine * std::sin(golden * k), std::sqrt(1.0 - square)});
+  }
+  return directions;
+}
+
+Frame frame_around(Vec3 normal) {
+  const double sign = std::copysign(1.0, normal.z);
+  const double a = -1.0 / (sign + normal.z);
+  const double b = normal.x * normal.y * a;
+  return {{1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x},
+          {b, sign + normal.y * normal.y * a, -normal.y},
+          normal};
+}
+
+}  // namespace opaline::render

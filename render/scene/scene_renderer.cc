@@ -1,0 +1,282 @@
+#include "render/scene/scene_renderer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "reconstruct/diffusion/fresnel.h"
+#include "render/scene/material_source.h"
+#include "render/scene/solid.h"
+
+namespace opaline::render {
+namespace {
+
+using reconstruct::diffusion::fresnel_reflectance;
+
+constexpr int kChunk = 256;
+constexpr double kOpaqueTetrahedra = 5e4;
+constexpr double kCoarse = 1.0;      // spacings to the shortest diffusion length
+constexpr double kFewFreePaths = 3;  // a body thinner than that many is not diffuse
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& sum) : sum_(sum) {}
+  ~Stopwatch() {
+    sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& sum_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Calls work(i) for 0 <= i < count on the team.
+template <class Work>
+void for_each(std::size_t count, ThreadTeam& team, const std::stop_token& stop, const Work& work) {
+  std::atomic<std::size_t> next{0};
+  team.run([&](int) {
+    for (std::size_t first = next.fetch_add(kChunk); first < count && !stop.stop_requested();
+         first = next.fetch_add(kChunk)) {
+      for (std::size_t i = first; i < std::min(count, first + kChunk); ++i) work(i);
+    }
+  });
+}
+
+}  // namespace
+
+CameraModel camera_of(const CameraOptions& camera, const PictureOptions& picture) {
+  CameraModel model;
+  model.width = picture.width;
+  model.height = picture.height;
+  const double half = 0.5 * camera.field_of_view_degrees * std::numbers::pi / 180.0;
+  model.fx = model.fy = 0.5 * picture.height / std::tan(half);
+  model.cx = 0.5 * picture.width;
+  model.cy = 0.5 * picture.height;
+  model.camera_from_sample = look_at(camera.position, camera.target, camera.up);
+  return model;
+}
+
+Result<std::unique_ptr<SceneRenderer>> SceneRenderer::create(const Scene& scene,
+                                                             ThreadTeam& team,
+                                                             const Step& step,
+                                                             std::stop_token stop) {
+  if (auto valid = validate(scene); !valid) return valid.error();
+  auto made = std::unique_ptr<SceneRenderer>(new SceneRenderer(scene, team));
+  double done = 0.0;
+  for (const ObjectOptions& object : scene.objects) {
+    step(fmt::format("preparing {}", object.name),
+         done / static_cast<double>(scene.objects.size()));
+    if (auto added = made->add(object, stop); !added) {
+      return added.error().in(fmt::format("object \"{}\"", object.name));
+    }
+    done += 1.0;
+  }
+  if (auto built = made->surfaces_.build(); !built) return built.error();
+  step("visibility of the environment", 1.0);
+  if (auto seen = made->look_at_sky(stop); !seen) return seen.error();
+  return made;
+}
+
+Result<void> SceneRenderer::add(const ObjectOptions& object, std::stop_token stop) {
+  return object.kind == ObjectOptions::Kind::kTranslucent ? add_translucent(object, stop)
+                                                          : add_opaque(object, stop);
+}
+
+Result<void> SceneRenderer::add_translucent(const ObjectOptions& object, std::stop_token stop) {
+  Result<LoadedShape> shape = LoadedShape{};
+  Result<MaterialSource> material = Error{};
+  {
+    const Stopwatch watch(statistics_.load_seconds);
+    shape = load_shape(object.shape);
+    if (!shape) return shape.error();
+    material = MaterialSource::create(object.material, scene_from_shape(object.shape));
+    if (!material) return material.error();
+  }
+  auto body = Subsurface::create(
+      *shape->solid,
+      [&](Vec3 place) { return material->at(place); },
+      material->ior(),
+      scene_.diffusion,
+      team_,
+      stop);
+  if (!body) return body.error();
+  const Subsurface::Report& report = (*body)->report();
+  statistics_.mesh_seconds += report.mesh_seconds;
+  statistics_.setup_seconds += report.setup_seconds;
+  std::ranges::move(shape->notes, std::back_inserter(statistics_.notes));
+  note_resolution(object, report);
+  auto drawn =
+      std::make_unique<DrawnSurface>((*body)->surface(), *shape->solid, scene_.picture.refinement);
+  const int number = surfaces_.add(drawn->mesh(), drawn->normals());
+  statistics_.objects.push_back({object.name, true, drawn->mesh().triangles.size(), report});
+  looks_.push_back({.translucent = true, .ior = material->ior(), .surface = object.surface});
+  bodies_.push_back({*std::move(body), std::move(drawn), number});
+  opaque_.emplace_back();
+  return ok();
+}
+
+Result<void> SceneRenderer::add_opaque(const ObjectOptions& object, std::stop_token stop) {
+  const Stopwatch watch(statistics_.load_seconds);
+  auto shape = load_opaque(object.shape, kOpaqueTetrahedra, stop);
+  if (!shape) return shape.error();
+  const bool by_name = shape->solid && object.shape.file.empty();
+  opaque_.push_back(by_name
+                        ? std::make_unique<DrawnSurface>(
+                              *std::move(shape->surface), *shape->solid, scene_.picture.refinement)
+                        : std::make_unique<DrawnSurface>(*std::move(shape->surface)));
+  const DrawnSurface& drawn = *opaque_.back();
+  surfaces_.add(drawn.mesh(), drawn.normals());
+  statistics_.objects.push_back({object.name, false, drawn.mesh().triangles.size(), {}});
+  looks_.push_back({.translucent = false,
+                    .ior = object.opaque_ior,
+                    .surface = object.surface,
+                    .reflectance = object.reflectance});
+  return ok();
+}
+
+void SceneRenderer::note_resolution(const ObjectOptions& object, const Subsurface::Report& report) {
+  const double tetrahedra = static_cast<double>(report.tetrahedra);
+  if (report.spacing_mm > kCoarse * report.shortest_diffusion_length) {
+    const double finer = report.spacing_mm / (kCoarse * report.shortest_diffusion_length);
+    statistics_.notes.push_back(
+        fmt::format("{}: light dies out within {:.3g} mm, and elements are {:.3g} mm long: about "
+                    "{:.2g} tetrahedra would show it",
+                    object.name,
+                    report.shortest_diffusion_length,
+                    report.spacing_mm,
+                    tetrahedra * finer * finer * finer));
+  }
+  const double across = std::cbrt(report.volume_mm3);
+  if (across < kFewFreePaths * report.shortest_free_path) {
+    statistics_.notes.push_back(fmt::format(
+        "{}: only {:.2g} transport mean free paths across: diffusion is a poor model of it",
+        object.name,
+        across / report.shortest_free_path));
+  }
+}
+
+Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
+  body_sky_.resize(bodies_.size());
+  if (is_black(scene_.environment.radiance)) {
+    statistics_.left_out.emplace_back("environment: it is black");
+    for (std::size_t o = 0; o < opaque_.size(); ++o) {
+      if (opaque_[o]) looks_[o].sky.assign(opaque_[o]->mesh().vertices.size(), 0.0F);
+    }
+    return ok();
+  }
+  const Stopwatch watch(statistics_.setup_seconds);
+  const bool hidden = scene_.environment.rays > 0;
+  if (!hidden) statistics_.left_out.emplace_back("environment: nothing hides it (rays = 0)");
+  const auto directions = cosine_directions(hidden ? scene_.environment.rays : 256);
+  const auto share = [&](const SurfacePlace& place, const auto& weight) {
+    if (hidden) return surfaces_.sky(place, directions, weight);
+    double sum = 0.0;
+    for (const Vec3& d : directions) sum += weight(d.z);
+    return sum / static_cast<double>(directions.size());
+  };
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const auto& places = bodies_[b].subsurface->places();
+    const double ior = looks_[bodies_[b].object].ior;
+    body_sky_[b].resize(places.size());
+    for_each(places.size(), team_, stop, [&](std::size_t i) {
+      const auto passed = [ior](double cosine) { return 1.0 - fresnel_reflectance(cosine, ior); };
+      body_sky_[b][i] = static_cast<float>(std::numbers::pi * share(places[i], passed));
+    });
+  }
+  for (std::size_t o = 0; o < opaque_.size(); ++o) {
+    if (!opaque_[o]) continue;
+    const TriangleMesh& mesh = opaque_[o]->mesh();
+    const Vec3 size = surfaces_.bounds().size();
+    const double small = 1e-4 * std::max({size.x, size.y, size.z});
+    looks_[o].sky.resize(mesh.vertices.size());
+    for_each(mesh.vertices.size(), team_, stop, [&](std::size_t v) {
+      const SurfacePlace place{mesh.vertices[v], opaque_[o]->normals()[v], small};
+      looks_[o].sky[v] = length(place.normal) > 0.0
+                             ? static_cast<float>(share(place, [](double) { return 1.0; }))
+                             : 0.0F;
+    });
+  }
+  if (stop.stop_requested()) return cancelled("looking for what hides the environment");
+  return ok();
+}
+
+std::vector<std::array<float, 3>> SceneRenderer::entering(const Body& body, std::stop_token stop) {
+  const auto& places = body.subsurface->places();
+  const auto& sky = body_sky_[&body - bodies_.data()];
+  const double ior = looks_[body.object].ior;
+  std::vector<std::array<float, 3>> q(places.size());
+  std::vector<std::atomic<bool>> reaches(lights_.size());
+  for_each(places.size(), team_, stop, [&](std::size_t i) {
+    Colour sum{};
+    for (int c = 0; c < 3 && !sky.empty(); ++c) sum[c] = sky[i] * scene_.environment.radiance[c];
+    for (std::size_t l = 0; l < lights_.size(); ++l) {
+      const LightSample from = sample(lights_[l], places[i].place);
+      const double cosine = dot(places[i].normal, from.towards);
+      if (!(cosine > 0.0) || is_black(from.irradiance)) continue;
+      if (lights_[l].shadows && surfaces_.hides(places[i], from.towards, from.distance)) continue;
+      reaches[l] = true;
+      const double passed = cosine * (1.0 - fresnel_reflectance(std::min(1.0, cosine), ior));
+      for (int c = 0; c < 3; ++c) sum[c] += passed * from.irradiance[c];
+    }
+    for (int c = 0; c < 3; ++c) q[i][c] = static_cast<float>(sum[c]);
+  });
+  for (std::size_t l = 0; l < lights_.size(); ++l) {
+    if (reaches[l]) light_reaches_[l] = true;
+  }
+  return q;
+}
+
+Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::stop_token stop) {
+  lights_ = lights;
+  light_reaches_.assign(lights.size(), false);
+  statistics_.light_seconds = statistics_.solve_seconds = 0.0;
+  for (const Body& body : bodies_) {
+    std::vector<std::array<float, 3>> q;
+    {
+      const Stopwatch watch(statistics_.light_seconds);
+      q = entering(body, stop);
+      if (stop.stop_requested()) return cancelled("lighting");
+    }
+    const Stopwatch watch(statistics_.solve_seconds);
+    const auto solved = body.subsurface->light(q, stop);
+    SceneStatistics::Object& object = statistics_.objects[body.object];
+    if (!solved) return solved.error().in(fmt::format("object \"{}\"", object.name));
+    object.iterations = solved->iterations;
+    object.relative_residual = solved->relative_residual;
+    looks_[body.object].light = body.drawn->spread(body.subsurface->lit());
+  }
+  leave_out();
+  return ok();
+}
+
+void SceneRenderer::leave_out() {
+  const auto say = [&](std::string what) {
+    auto& list = statistics_.left_out;
+    if (std::ranges::find(list, what) == list.end()) list.push_back(std::move(what));
+  };
+  const bool only_bodies =
+      std::ranges::none_of(opaque_, [](const auto& o) { return o != nullptr; });
+  for (std::size_t l = 0; l < lights_.size() && only_bodies; ++l) {
+    if (!light_reaches_[l]) say(fmt::format("{}: it reaches no object", lights_[l].name));
+  }
+  for (std::size_t o = 0; o < looks_.size(); ++o) {
+    if (looks_[o].surface.specular != SpecularModel::kNone && looks_[o].ior == 1.0) {
+      say(fmt::format("specular of {}: nothing is mirrored at ior 1", statistics_.objects[o].name));
+    }
+  }
+}
+
+Result<Image<float>> SceneRenderer::draw(const CameraModel& camera, std::stop_token stop) {
+  statistics_.draw_seconds = 0.0;
+  const Stopwatch watch(statistics_.draw_seconds);
+  const Painter painter(surfaces_, looks_, lights_, scene_.environment);
+  return painter.draw(camera, scene_.picture.samples_per_axis, team_, stop);
+}
+
+}  // namespace opaline::render

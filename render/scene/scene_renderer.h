@@ -1,0 +1,102 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/camera_model.h"
+#include "base/image.h"
+#include "base/thread_team.h"
+#include "render/scene/drawn_surface.h"
+#include "render/scene/painter.h"
+#include "render/scene/scene.h"
+#include "render/scene/subsurface.h"
+
+namespace opaline::render {
+
+/// What drawing a scene took, and what it left out.
+struct SceneStatistics {
+  struct Object {
+    std::string name;
+    bool translucent = true;
+    std::size_t triangles = 0;  ///< as drawn
+    Subsurface::Report body;    ///< of a translucent one
+    int iterations = 0;         ///< of the last solution
+    double relative_residual = 0.0;
+  };
+  std::vector<Object> objects;
+  double load_seconds = 0.0;          ///< reading shapes and materials
+  double mesh_seconds = 0.0;          ///< cutting into tetrahedra
+  double setup_seconds = 0.0;         ///< graph, coefficients, matrix, hierarchy
+  double light_seconds = 0.0;         ///< lights and their shadows, last lighting
+  double solve_seconds = 0.0;         ///< last lighting
+  double draw_seconds = 0.0;          ///< last picture
+  std::vector<std::string> left_out;  ///< what the scene cannot show, and why
+  std::vector<std::string> notes;     ///< what a user should know
+};
+
+/// A scene made ready once, then lit and drawn as often as wanted: translucent objects by diffusion (subsurface.h), light
+/// entering as `surface` light of docs/physics.md,
+///
+///   q = sum of lights (1 - R(n.l)) E (n.l) [not hidden] + int (1 - R(mu)) L_env mu dw [not hidden],
+///
+/// all objects seen by rays (painter.h).
+///
+/// Left out: light between objects beyond shadows; single scattering; light through a translucent object that never
+/// scattered.
+/// Threads: one call at a time; the team does the work.
+/// Errors:  kInvalidArgument, naming object or light, for what validate() and the files refuse; kNotFound; kCancelled;
+///          kInternal where a solution is not found.
+class SceneRenderer {
+ public:
+  using Step = std::function<void(std::string_view what, double fraction)>;
+
+  /// The team must outlive it. `step` hears what is done next.
+  static Result<std::unique_ptr<SceneRenderer>> create(const Scene& scene,
+                                                       ThreadTeam& team,
+                                                       const Step& step,
+                                                       std::stop_token stop);
+
+  /// Lights the objects; the scene's own lights, or the same moved. Starts from the last lighting.
+  Result<void> light(const std::vector<LightOptions>& lights, std::stop_token stop);
+  /// Linear radiance and coverage, as Painter says. Call light() first.
+  Result<Image<float>> draw(const CameraModel& camera, std::stop_token stop);
+
+  const SceneStatistics& statistics() const { return statistics_; }
+
+ private:
+  struct Body {
+    std::unique_ptr<Subsurface> subsurface;
+    std::unique_ptr<DrawnSurface> drawn;
+    int object = 0;
+  };
+
+  SceneRenderer(const Scene& scene, ThreadTeam& team) : scene_(scene), team_(team) {}
+  Result<void> add(const ObjectOptions& object, std::stop_token stop);
+  Result<void> add_translucent(const ObjectOptions& object, std::stop_token stop);
+  Result<void> add_opaque(const ObjectOptions& object, std::stop_token stop);
+  void note_resolution(const ObjectOptions& object, const Subsurface::Report& report);
+  Result<void> look_at_sky(std::stop_token stop);
+  std::vector<std::array<float, 3>> entering(const Body& body, std::stop_token stop);
+  void leave_out();
+
+  Scene scene_;
+  ThreadTeam& team_;
+  std::vector<LightOptions> lights_;
+  std::vector<Body> bodies_;
+  std::vector<std::unique_ptr<DrawnSurface>> opaque_;  // by object; none for a translucent one
+  std::vector<std::vector<float>>
+      body_sky_;  // of each body's places: int (1 - R) mu dw, not hidden
+  Surfaces surfaces_;
+  std::vector<Look> looks_;
+  std::vector<bool> light_reaches_;
+  SceneStatistics statistics_;
+};
+
+/// A pinhole camera for a picture, the field of view that of its height.
+CameraModel camera_of(const CameraOptions& camera, const PictureOptions& picture);
+
+}  // namespace opaline::render

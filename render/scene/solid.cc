@@ -1,0 +1,170 @@
+#include "render/scene/solid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/io/level_set_io.h"
+#include "render/mesh/mesh_distance.h"
+#include "render/mesh/read_mesh.h"
+#include "render/mesh/shapes.h"
+#include "render/tetrahedra/stuffing.h"
+
+namespace opaline::render {
+namespace {
+
+constexpr int kPlaneCells = 128;
+
+Pose turned(int axis, double degrees) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  Pose pose;
+  const int i = (axis + 1) % 3;
+  const int j = (axis + 2) % 3;
+  pose.rotation[3 * i + i] = c;
+  pose.rotation[3 * j + j] = c;
+  pose.rotation[3 * i + j] = -s;
+  pose.rotation[3 * j + i] = s;
+  return pose;
+}
+
+Pose chained(const Pose& second, const Pose& first) {
+  Pose pose;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < 3; ++k) sum += second.rotation[3 * i + k] * first.rotation[3 * k + j];
+      pose.rotation[3 * i + j] = sum;
+    }
+  }
+  pose.translation = second.apply(first.translation);
+  return pose;
+}
+
+double longest(Vec3 size) { return std::max({size.x, size.y, size.z}); }
+
+Result<TriangleMesh> read_surface(const std::filesystem::path& file) {
+  if (file.extension() != ".vdb" && file.extension() != ".VDB") return read_mesh(file);
+  auto surface = read_level_set(file);
+  if (!surface) return surface.error();
+  return TriangleMesh{std::move(surface->vertices), std::move(surface->triangles)};
+}
+
+Result<TriangleMesh> placed_surface(const ShapeOptions& shape) {
+  auto mesh = read_surface(shape.file);
+  if (!mesh) return mesh.error();
+  const Box box = bounds(*mesh);
+  const double extent = longest(box.size());
+  if (!(extent > 0.0))
+    return invalid_argument("all of its corners are one").in(shape.file.string());
+  const double scale = shape.size_mm > 0.0 ? shape.size_mm / extent : shape.unit_mm;
+  const Vec3 origin = shape.centred ? box.centre() : Vec3{};
+  const Pose pose = scene_from_shape(shape);
+  for (Vec3& p : mesh->vertices) p = pose.apply((p - origin) * scale);
+  return mesh;
+}
+
+std::vector<std::string> notes_on(const TriangleMesh& mesh, const std::filesystem::path& file) {
+  const MeshTopology found = topology(weld(mesh));
+  std::vector<std::string> notes;
+  const auto say = [&](const std::string& what) {
+    notes.push_back(fmt::format("{}: {}", file.filename().string(), what));
+  };
+  if (found.open_edges > 0) {
+    say(fmt::format("not closed ({} open edges): its holes are closed as a soap film would",
+                    found.open_edges));
+  }
+  if (found.crowded_edges > 0) {
+    say(fmt::format("{} edges have more than two triangles: what overlaps is joined",
+                    found.crowded_edges));
+  }
+  if (found.flipped_edges > 0) {
+    say(
+        fmt::format("neighbouring triangles face different ways at {} edges: what they enclose may "
+                    "not be what was meant",
+                    found.flipped_edges));
+  }
+  return notes;
+}
+
+}  // namespace
+
+Pose scene_from_shape(const ShapeOptions& shape) {
+  const auto& degrees = shape.rotation_degrees;
+  Pose pose = chained(turned(2, degrees[2]), chained(turned(1, degrees[1]), turned(0, degrees[0])));
+  pose.translation = shape.position;
+  return pose;
+}
+
+PlacedSolid::PlacedSolid(std::unique_ptr<SignedDistance> solid, const Pose& scene_from_solid)
+    : solid_(std::move(solid)), solid_from_scene_(scene_from_solid.inverse()) {
+  const Box box = solid_->bounds();
+  TriangleMesh corners;
+  for (int k = 0; k < 8; ++k) {
+    corners.vertices.push_back(scene_from_solid.apply({(k & 1) != 0 ? box.high.x : box.low.x,
+                                                       (k & 2) != 0 ? box.high.y : box.low.y,
+                                                       (k & 4) != 0 ? box.high.z : box.low.z}));
+  }
+  bounds_ = opaline::render::bounds(corners);
+}
+
+Result<LoadedShape> load_shape(const ShapeOptions& shape) {
+  LoadedShape loaded;
+  if (!shape.name.empty()) {
+    auto solid = make_shape(shape.name, shape.size_mm);
+    if (!solid) return solid.error();
+    loaded.solid = std::make_unique<PlacedSolid>(*std::move(solid), scene_from_shape(shape));
+    return loaded;
+  }
+  auto surface = placed_surface(shape);
+  if (!surface) return surface.error();
+  auto solid = MeshDistance::create(*surface);
+  if (!solid) return solid.error().in(shape.file.string());
+  loaded.solid = *std::move(solid);
+  loaded.notes = notes_on(*surface, shape.file);
+  loaded.surface = *std::move(surface);
+  return loaded;
+}
+
+TriangleMesh plane_mesh(double size_mm, int cells) {
+  TriangleMesh mesh;
+  const double step = size_mm / cells;
+  for (int j = 0; j <= cells; ++j) {
+    for (int i = 0; i <= cells; ++i) {
+      mesh.vertices.push_back({i * step - 0.5 * size_mm, j * step - 0.5 * size_mm, 0.0});
+    }
+  }
+  for (int j = 0; j < cells; ++j) {
+    for (int i = 0; i < cells; ++i) {
+      const int a = j * (cells + 1) + i;
+      const int b = a + cells + 1;
+      mesh.triangles.push_back({a, a + 1, b + 1});
+      mesh.triangles.push_back({a, b + 1, b});
+    }
+  }
+  return mesh;
+}
+
+Result<LoadedShape> load_opaque(const ShapeOptions& shape,
+                                double tetrahedra,
+                                std::stop_token stop) {
+  if (shape.name == "plane") {
+    LoadedShape loaded;
+    loaded.surface = plane_mesh(shape.size_mm, kPlaneCells);
+    const Pose pose = scene_from_shape(shape);
+    for (Vec3& p : loaded.surface->vertices) p = pose.apply(p);
+    return loaded;
+  }
+  auto loaded = load_shape(shape);
+  if (!loaded || loaded->surface) return loaded;
+  const double spacing = spacing_for(estimate_volume(*loaded->solid), tetrahedra);
+  const auto tets = stuff(*loaded->solid, {.spacing_mm = spacing, .interior_growth = 1.0}, stop);
+  if (!tets) return tets.error();
+  loaded->surface = surface_mesh(*tets);
+  return loaded;
+}
+
+}  // namespace opaline::render

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "base/thread_team.h"
+#include "reconstruct/diffusion/fluence_solver.h"
+#include "render/graph/optics.h"
+#include "render/mesh/signed_distance.h"
+#include "render/scene/scene.h"
+#include "render/scene/surfaces.h"
+#include "render/tetrahedra/tet_mesh.h"
+
+namespace opaline::render {
+
+/// A solid in which light diffuses: cut up, its coefficients taken at each node, ready to be lit again and again, each
+/// solution started from the one before.
+///
+///   graph      two-point volumes on the QuadGraph of its tetrahedra, single precision    (render/graph/two_point.h)
+///   elements   linear finite elements on the same tetrahedra, double precision           (render/graph/finite_elements.h)
+///   polygrid   two-point volumes on a lattice of the same spacing, single precision      (render/graph/polygrid.h)
+///
+/// Whatever carries the light, it is seen on the surface of the tetrahedra.
+///
+/// Threads: one call at a time.
+class Subsurface {
+ public:
+  using MaterialAt = std::function<Optics(Vec3)>;
+
+  struct Report {
+    std::size_t tetrahedra = 0;
+    std::size_t unknowns = 0;
+    double spacing_mm = 0.0;
+    double volume_mm3 = 0.0;
+    double smallest_dihedral = 0.0;  ///< degrees
+    int components = 0;
+    double shortest_diffusion_length =
+        0.0;                          ///< min 1 / sigma_tr, mm; infinite where nothing is absorbed
+    double shortest_free_path = 0.0;  ///< min 1 / (sigma_a + sigma_s'), mm
+    double mesh_seconds = 0.0;
+    double setup_seconds = 0.0;
+  };
+
+  /// The team must outlive it. Errors: those of stuff(), make_polygrid() and validate(optics); kCancelled.
+  static Result<std::unique_ptr<Subsurface>> create(const SignedDistance& solid,
+                                                    const MaterialAt& material,
+                                                    double ior,
+                                                    const DiffusionOptions& options,
+                                                    ThreadTeam& team,
+                                                    std::stop_token stop);
+  virtual ~Subsurface() = default;
+
+  const TriangleMesh& surface() const { return surface_; }
+  const Report& report() const { return report_; }
+  /// Where q is asked for.
+  const std::vector<SurfacePlace>& places() const { return places_; }
+  /// Solves for light q, W/mm^2 transmitted into the surface, one value a place. Errors: kCancelled; kInternal where the
+  /// solution did not get below ten times the tolerance.
+  Result<reconstruct::diffusion::SolveSummary> light(std::span<const std::array<float, 3>> q,
+                                                     std::stop_token stop);
+  /// Of the last solution, one value a vertex of surface().
+  const SurfaceLight& lit() const { return lit_; }
+
+ protected:
+  virtual reconstruct::diffusion::SolveSummary solve(std::span<const std::array<float, 3>> q,
+                                                     std::stop_token stop) = 0;
+  virtual SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const = 0;
+
+  TriangleMesh surface_;
+  std::vector<SurfacePlace> places_;
+  Report report_;
+  DiffusionOptions options_;
+
+ private:
+  SurfaceLight lit_;
+};
+
+}  // namespace opaline::render
