@@ -1,0 +1,331 @@
+#include "capture/gradient_sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "base/io/stage_record_io.h"
+#include "base/log.h"
+#include "capture/frame_store.h"
+#include "capture/hdr_file.h"
+#include "capture/hdr_merge.h"
+#include "capture/patterns.h"
+#include "capture/region_taker.h"
+#include "drivers/stage_picture.h"
+
+namespace opaline::capture {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::nanoseconds;
+
+constexpr const char* kBlackName = "black";
+constexpr double kHopelessDrift = 10.0;  // over the limit
+
+double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+
+/// The camera's directions along a row, down a column, and back towards itself.
+std::array<Vec3, 3> axes_of(const CameraModel& camera) {
+  const auto& r = camera.camera_from_sample.rotation;
+  return {Vec3{r[0], r[1], r[2]}, Vec3{r[3], r[4], r[5]}, Vec3{-r[6], -r[7], -r[8]}};
+}
+
+double mean(const Image<float>& picture, int x, int y) {
+  return (picture.at(x, y, 0) + picture.at(x, y, 1) + picture.at(x, y, 2)) / 3.0;
+}
+
+/// One run over a session directory.
+class GradientSequence {
+ public:
+  GradientSequence(const GradientTask& task,
+                   const Station& station,
+                   const Workplace& workplace,
+                   std::vector<StageLight> patterns)
+      : task_(task),
+        station_(station),
+        work_(workplace),
+        patterns_(std::move(patterns)),
+        store_(workplace.files, workplace.directory / "frames"),
+        seen_(task.camera.model.width, task.camera.model.height, 1, 1),
+        started_(station.clock.now()) {}
+
+  Result<GradientSummary> run(std::stop_token stop);
+
+ private:
+  using Frames = std::vector<CapturedFrame>;
+  drivers::Pattern picture_of(const StageLight& light, std::uint64_t id) const;
+  Result<RegionTaker*> taker(std::stop_token stop);
+  Result<Frames> load(const std::string& name, const drivers::Pattern& pattern);
+  Result<void> take_black(std::stop_token stop);
+  void use_black(Frames frames);
+  Result<Frames> frames_of(std::size_t n, std::stop_token stop);
+  Result<Frames> take(std::size_t n, const drivers::Pattern& pattern, std::stop_token stop);
+  Result<void> do_light(std::size_t n, std::stop_token stop);
+  Result<void> find_object(const HdrImage& constant);
+  double light_on_object(const HdrImage& hdr) const;
+  Result<void> judge_drift();
+  Result<void> finish();
+  void report(const std::string& name, std::optional<nanoseconds> exposure) const;
+
+  const GradientTask& task_;
+  const Station& station_;
+  const Workplace& work_;
+  std::vector<StageLight> patterns_;
+  FrameStore store_;
+  Image<std::uint8_t> seen_;  // pixels that see the object; all, until that is known
+  nanoseconds started_;
+  Frames black_frames_;
+  BlackFrames black_;
+  std::unique_ptr<RegionTaker> taker_;
+  std::optional<HdrMerge> merge_;
+  double first_light_ = 0.0;
+  GradientSummary summary_;
+};
+
+drivers::Pattern GradientSequence::picture_of(const StageLight& light, std::uint64_t id) const {
+  return drivers::stage_picture(
+      {id,
+       light.codes,
+       light.parallel ? drivers::Polarization::kParallel : drivers::Polarization::kCross,
+       light.name});
+}
+
+void GradientSequence::use_black(Frames frames) {
+  black_frames_ = std::move(frames);
+  black_ = BlackFrames(black_frames_, task_.camera, seen_);
+  merge_.emplace(task_.camera, black_.hot());
+}
+
+Result<GradientSequence::Frames> GradientSequence::load(const std::string& name,
+                                                        const drivers::Pattern& pattern) {
+  auto stored = store_.load(name, pattern);
+  if (!stored) return stored.error();
+  if (!stored->damage.empty()) {
+    log::warning("{}; {} is taken again", stored->damage, name);
+    auto noted =
+        work_.events.fact("region.damaged", {{"region", name}, {"message", stored->damage}});
+    if (!noted) return noted.error();
+  }
+  const CameraModel& model = task_.camera.model;
+  const bool fits = std::ranges::all_of(stored->frames, [&](const CapturedFrame& c) {
+    return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height;
+  });
+  if (!fits) stored->frames.clear();
+  return std::move(stored->frames);
+}
+
+Result<RegionTaker*> GradientSequence::taker(std::stop_token stop) {
+  if (taker_) return taker_.get();
+  auto made = RegionTaker::create(station_, {task_.options, task_.camera}, work_.events);
+  if (!made) return made.error();
+  taker_ = *std::move(made);
+  if (!black_.cover(taker_->ladder())) {
+    if (auto black = take_black(stop); !black) return black.error();
+  }
+  return taker_.get();
+}
+
+Result<void> GradientSequence::take_black(std::stop_token stop) {
+  const drivers::Pattern black =
+      picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern);
+  auto taken = taker_->take_black(
+      black, [this](nanoseconds e) { report(kBlackName, e); }, stop);
+  if (!taken) return taken.error();
+  if (auto saved = store_.save(kBlackName, black, taken->frames); !saved) return saved;
+  use_black(std::move(taken->frames));
+  return ok();
+}
+
+Result<GradientSequence::Frames> GradientSequence::take(std::size_t n,
+                                                        const drivers::Pattern& pattern,
+                                                        std::stop_token stop) {
+  const std::string& name = patterns_[n].name;
+  auto devices = taker(stop);
+  if (!devices) return devices.error();
+  auto taken = (*devices)->take_light(
+      name, pattern, black_, [&](nanoseconds e) { report(name, e); }, stop);
+  if (!taken) return taken.error();
+  if (!taken->lit)
+    return unavailable(
+        fmt::format("{} is black even at {:.4g} s: are the lamps on, the lens cap off, the object "
+                    "in the middle? Then start again: it goes on at {}",
+                    name,
+                    seconds((*devices)->ladder().back()),
+                    name));
+  summary_.retaken += taken->retaken;
+  if (auto saved = store_.save(name, pattern, taken->frames); !saved) return saved.error();
+  ++summary_.taken;
+  auto noted = work_.events.fact(
+      "region.captured",
+      {{"region", name}, {"exposures", taken->frames.size()}, {"retaken", taken->retaken}});
+  if (!noted) return noted.error();
+  return std::move(taken->frames);
+}
+
+Result<GradientSequence::Frames> GradientSequence::frames_of(std::size_t n, std::stop_token stop) {
+  const drivers::Pattern pattern = picture_of(patterns_[n], kFirstLight + n);
+  auto stored = load(patterns_[n].name, pattern);
+  if (!stored) return stored.error();
+  std::vector<nanoseconds> exposures;
+  for (const CapturedFrame& frame : *stored) exposures.push_back(frame.exposure_asked);
+  if (stored->empty() || !black_.cover(exposures)) return take(n, pattern, stop);
+  return stored;
+}
+
+Result<void> GradientSequence::do_light(std::size_t n, std::stop_token stop) {
+  const std::string& name = patterns_[n].name;
+  report(name, std::nullopt);
+  const auto frames = frames_of(n, stop);
+  if (!frames) return frames.error();
+  std::vector<ExposurePair> pairs;
+  for (const CapturedFrame& frame : *frames) {
+    const auto pair = black_.pair(frame);
+    if (!pair) return internal_error(fmt::format("{}: no black frame of its exposure", name));
+    pairs.push_back(*pair);
+  }
+  const HdrImage hdr = merge_->merge(pairs);
+  if (n == 0) {
+    if (auto found = find_object(hdr); !found) return found;
+    first_light_ = light_on_object(hdr);
+  }
+  if (n + 1 == patterns_.size()) summary_.drift = light_on_object(hdr) / first_light_ - 1.0;
+  ++summary_.pictures;
+  return write_hdr(work_.files, work_.directory / "hdr" / (name + ".exr"), hdr);
+}
+
+Result<void> GradientSequence::find_object(const HdrImage& constant) {
+  const double white = task_.depolarised * mean_radiance(task_.lights, patterns_[0].codes);
+  std::size_t count = 0;
+  for (int y = 0; y < seen_.height(); ++y)
+    for (int x = 0; x < seen_.width(); ++x) {
+      const bool bright = mean(constant.radiance, x, y) > task_.gradient.object_threshold * white;
+      seen_.at(x, y) = bright ? 1 : 0;
+      count += bright ? 1 : 0;
+    }
+  if (count < 100)
+    return unavailable(fmt::format(
+        "{} pixels are brighter than {:.3g} % of a white surface: is the object in the middle of "
+        "the sphere, and are camera and lamps calibrated? (led_sphere.object_threshold)",
+        count,
+        100.0 * task_.gradient.object_threshold));
+  use_black(std::move(black_frames_));  // their footprint is the object from here on
+  return ok();
+}
+
+double GradientSequence::light_on_object(const HdrImage& hdr) const {
+  double sum = 0.0;
+  for (int y = 0; y < seen_.height(); ++y)
+    for (int x = 0; x < seen_.width(); ++x)
+      if (black_.footprint().at(x, y) != 0 && hdr.mask.at(x, y) != 0)
+        sum += mean(hdr.radiance, x, y);
+  return sum;
+}
+
+Result<void> GradientSequence::judge_drift() {
+  const double limit = task_.gradient.drift_limit;
+  if (std::abs(summary_.drift) <= limit) return ok();
+  log::warning("the lamps drifted by {:.2f} % during the capture", 100.0 * summary_.drift);
+  auto noted = work_.events.fact("stage.drift", {{"drift", summary_.drift}, {"limit", limit}});
+  if (!noted || std::abs(summary_.drift) <= kHopelessDrift * limit) return noted;
+  return unavailable(
+      fmt::format("the lamps drifted by {:.1f} % from the first picture to the last: let them warm "
+                  "up for half an hour, and start a new session",
+                  100.0 * summary_.drift));
+}
+
+Result<void> GradientSequence::finish() {
+  taker_.reset();  // dark from here on
+  if (auto steady = judge_drift(); !steady) return steady;
+  const CameraModel& camera = task_.camera.model;
+  StageRecord record;
+  record.lights = task_.lights;
+  record.axes = axes_of(camera);
+  const Vec3 eye = camera.centre();
+  const double distance = dot(eye, record.axes[2]) - task_.gradient.object_depth_mm;
+  record.middle = eye - record.axes[2] * distance;
+  record.middle_x = camera.cx;
+  record.middle_y = camera.cy;
+  record.pixel_mm = distance / (0.5 * (camera.fx + camera.fy));
+  record.depolarised = task_.depolarised;
+  record.drift = summary_.drift;
+  record.split = task_.gradient.patterns.split;
+  const auto last = static_cast<double>(patterns_.size() - 1);
+  for (std::size_t n = 0; n < patterns_.size(); ++n)
+    record.pictures.push_back({patterns_[n].name,
+                               patterns_[n].codes,
+                               patterns_[n].parallel,
+                               1.0 + summary_.drift * static_cast<double>(n) / last});
+  if (auto written = write_stage_record(work_.files, work_.directory, record); !written)
+    return written;
+  return work_.events.fact("capture.completed",
+                           {{"lights", summary_.pictures},
+                            {"taken", summary_.taken},
+                            {"retaken", summary_.retaken},
+                            {"drift", summary_.drift}});
+}
+
+Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
+  for (const fs::path& directory : {store_.directory(), work_.directory / "hdr"}) {
+    if (auto made = work_.files.make_directories(directory); !made) return made.error();
+  }
+  remove_partial_files(work_.files, work_.directory);
+  if (auto noted = work_.events.fact("capture.planned", {{"pictures", patterns_.size()}}); !noted)
+    return noted.error();
+  auto black = load(
+      kBlackName,
+      picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern));
+  if (!black) return black.error();
+  if (!black->empty()) {
+    use_black(*std::move(black));
+  } else if (auto devices = taker(stop); !devices) {
+    return devices.error();
+  }
+  for (std::size_t n = 0; n < patterns_.size(); ++n) {
+    if (stop.stop_requested()) return cancelled(fmt::format("before {}", patterns_[n].name));
+    if (auto done = do_light(n, stop); !done) return done.error();
+  }
+  if (auto finished = finish(); !finished) return finished.error();
+  return summary_;
+}
+
+void GradientSequence::report(const std::string& name, std::optional<nanoseconds> exposure) const {
+  const auto total = static_cast<double>(patterns_.size());
+  Progress progress{"capture", summary_.pictures / total, std::nullopt, nlohmann::json::object()};
+  progress.detail = {
+      {"light", summary_.pictures + 1}, {"lights", patterns_.size()}, {"region", name}};
+  if (exposure) progress.detail["exposure"] = fmt::format("{:.3g} s", seconds(*exposure));
+  if (summary_.taken > 0) {
+    const double elapsed = seconds(station_.clock.now() - started_) / station_.clock.pace();
+    progress.seconds_left = elapsed / summary_.taken * (total - summary_.pictures);
+  }
+  work_.events.progress(progress);
+}
+
+}  // namespace
+
+Result<void> validate(const GradientOptions& options) {
+  if (!(options.object_threshold > 0.0 && options.object_threshold < 1.0))
+    return invalid_argument(
+        fmt::format("led_sphere.object_threshold = {}; expected 0 to 1", options.object_threshold));
+  if (!(options.drift_limit > 0.0))
+    return invalid_argument(
+        fmt::format("led_sphere.drift_limit = {}; expected > 0", options.drift_limit));
+  return ok();
+}
+
+Result<GradientSummary> capture_gradients(const GradientTask& task,
+                                          const Station& station,
+                                          const Workplace& workplace,
+                                          std::stop_token stop) {
+  if (auto good = validate(task.options); !good) return good.error();
+  if (auto good = validate(task.gradient); !good) return good.error();
+  auto patterns = stage_patterns(task.lights, axes_of(task.camera.model), task.gradient.patterns);
+  if (!patterns) return patterns.error();
+  return GradientSequence(task, station, workplace, *std::move(patterns)).run(std::move(stop));
+}
+
+}  // namespace opaline::capture
