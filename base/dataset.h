@@ -34,6 +34,9 @@ struct Dataset {
   Face seen_face = Face::kZMax;  ///< what the camera looks at
   Image<float> view_cosine;  ///< on the seen face, 1 channel: cosine of the angle of the camera to
                              ///< the normal
+  Image<float>
+      view_direction;  ///< on the seen face, 2 channels: the unit vector towards the camera along the face's
+                       ///< column and row axes; empty where only view_cosine is known
   std::vector<Illumination> illuminations;
 };
 

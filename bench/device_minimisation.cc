@@ -71,6 +71,7 @@ Result<ChannelProblem> make_problem(const Block& block, diffusion::FluenceSolver
                          .boundary = *boundary,
                          .source = {},
                          .camera = {},
+                         .rays = {},
                          .illuminations = {},
                          .data_count = 1};
   problem.camera.assign(block.face_cell_count(Face::kZMax),

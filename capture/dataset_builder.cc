@@ -12,7 +12,8 @@ Dataset empty_dataset(const SampleGeometry& sample, const SurfaceMap& map) {
   dataset.ior = sample.ior;
   dataset.lit_face = sample.lit_face;
   dataset.seen_face = sample.seen_face;
-  dataset.view_cosine = map.view_cosine();
+  dataset.view_cosine = map.view().cosine;
+  dataset.view_direction = map.view().direction;
   return dataset;
 }
 

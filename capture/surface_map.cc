@@ -130,13 +130,9 @@ void SurfaceMap::drop_partial_pixels(const CameraModel& camera) {
 Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const CameraModel& camera) {
   if (auto direction = check_direction(block, face, camera); !direction) return direction.error();
   SurfaceMap map(block.face_width(face), block.face_height(face));
-  map.view_cosine_ = Image<float>(map.width_, map.height_, 1);
-  const Vec3 normal = outward_normal(face);
-  const Vec3 eye = camera.centre();
+  map.view_ = view_of_face(block, face, camera.centre());
   for (int row = 0; row < map.height_; ++row) {
     for (int column = 0; column < map.width_; ++column) {
-      const Vec3 towards = normalized(eye - face_point(block, face, column + 0.5, row + 0.5));
-      map.view_cosine_.at(column, row) = static_cast<float>(dot(normal, towards));
       map.add_cell({camera.project(face_point(block, face, column, row)),
                     camera.project(face_point(block, face, column + 1, row)),
                     camera.project(face_point(block, face, column + 1, row + 1)),

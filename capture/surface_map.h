@@ -5,6 +5,7 @@
 
 #include "base/block.h"
 #include "base/camera_model.h"
+#include "base/face_view.h"
 #include "base/image.h"
 #include "base/result.h"
 #include "capture/hdr_merge.h"
@@ -34,8 +35,7 @@ class SurfaceMap {
   SurfaceRadiance apply(const HdrImage& hdr, double min_coverage) const;
   /// 1 for camera pixels that lie wholly on the face.
   const Image<std::uint8_t>& footprint() const { return footprint_; }
-  /// Cosine between a cell's normal and the direction to the camera, 1 channel.
-  const Image<float>& view_cosine() const { return view_cosine_; }
+  const FaceView& view() const { return view_; }
 
  private:
   struct Share {
@@ -54,7 +54,7 @@ class SurfaceMap {
   int height_;
   std::vector<Cell> cells_;  // row by row
   Image<std::uint8_t> footprint_;
-  Image<float> view_cosine_;
+  FaceView view_;
 };
 
 }  // namespace opaline::capture

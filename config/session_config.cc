@@ -21,6 +21,7 @@ using reconstruct::InverseOptions;
 constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 2> kCameraNames{"refracted_ray", "surface"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 2> kStructureNames{"separate", "shared"};
 constexpr std::array<std::string_view, 4> kModelNames{
@@ -105,6 +106,7 @@ void visit_reconstruction(Fields& fields, SessionConfig& session) {
                 r.deposit,
                 kDepositNames);
   fields.one_of({"boundary", "condition at the surface"}, r.boundary, kBoundaryNames);
+  fields.one_of({"camera", "what the camera sees of the diffused light"}, r.camera, kCameraNames);
   fields.number({"model_error", "relative, of the diffusion model itself"},
                 r.model_error,
                 Range::at_least(0));

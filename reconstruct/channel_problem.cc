@@ -122,6 +122,25 @@ Result<std::vector<diffusion::CameraEquation>> camera_gains(const Dataset& datas
   return camera;
 }
 
+Result<std::vector<diffusion::CameraRay>> camera_rays(const Dataset& dataset,
+                                                      const InverseOptions& options) {
+  std::vector<diffusion::CameraRay> rays;
+  if (!along_rays(dataset, options)) return rays;
+  if (!covers(dataset.view_direction, dataset.block, dataset.seen_face, 2))
+    return invalid_argument("the view direction does not cover the cells of the seen face");
+  for (int row = 0; row < dataset.view_direction.height(); ++row) {
+    for (int column = 0; column < dataset.view_direction.width(); ++column) {
+      const double x = dataset.view_direction.at(column, row, 0);
+      const double y = dataset.view_direction.at(column, row, 1);
+      if (!(std::hypot(x, y) <= 1.0))
+        return invalid_argument(
+            fmt::format("view direction ({}, {}); expected a unit vector", x, y));
+      rays.push_back(diffusion::camera_ray(dataset.ior, x, y));
+    }
+  }
+  return rays;
+}
+
 bool selected(const Illumination& illumination, Selection selection) {
   return selection == Selection::kAll ||
          illumination.held_out == (selection == Selection::kHeldOut);
@@ -149,12 +168,15 @@ Result<ChannelProblem> make_channel_problem(const Dataset& dataset,
   if (!boundary) return boundary.error();
   auto camera = camera_gains(dataset, *boundary);
   if (!camera) return camera.error();
+  auto rays = camera_rays(dataset, options);
+  if (!rays) return rays.error();
   ChannelProblem problem{.block = dataset.block,
                          .lit_face = dataset.lit_face,
                          .seen_face = dataset.seen_face,
                          .boundary = *boundary,
                          .source = {options.source, options.deposit},
                          .camera = *std::move(camera),
+                         .rays = *std::move(rays),
                          .illuminations = {},
                          .data_count = 0,
                          .noise = 0.0};

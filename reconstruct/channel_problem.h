@@ -6,6 +6,7 @@
 #include "base/ensure.h"
 #include "reconstruct/diffusion/boundary.h"
 #include "reconstruct/diffusion/camera_equation.h"
+#include "reconstruct/diffusion/camera_rays.h"
 #include "reconstruct/inverse_options.h"
 
 namespace opaline::reconstruct {
@@ -27,6 +28,7 @@ struct ChannelProblem {
   diffusion::Boundary boundary;
   diffusion::SourceOptions source;
   std::vector<diffusion::CameraEquation> camera;  ///< per cell of the seen face
+  std::vector<diffusion::CameraRay> rays;         ///< the same; empty with the surface's camera law
   std::vector<ChannelIllumination> illuminations;
   std::size_t data_count = 0;  ///< data of weight > 0
   double noise = 0.0;          ///< of all illuminations: the chi^2 that measured noise alone makes

@@ -247,6 +247,7 @@ void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
                            static_cast<double>(o.source),
                            static_cast<double>(o.deposit),
                            static_cast<double>(o.boundary),
+                           static_cast<double>(o.camera),
                            static_cast<double>(o.method),
                            static_cast<double>(o.model),
                            static_cast<double>(o.structure),
@@ -288,6 +289,7 @@ std::string fingerprint(const Dataset& dataset, const InverseOptions& options) {
   const std::array faces{dataset.lit_face, dataset.seen_face};
   append(bytes, faces.data(), sizeof faces);
   append_image(bytes, dataset.view_cosine);
+  append_image(bytes, dataset.view_direction);
   for (const Illumination& i : dataset.illuminations) {
     append(bytes, i.name.data(), i.name.size() + 1);
     append(bytes, &i.held_out, sizeof i.held_out);

@@ -130,6 +130,18 @@ std::vector<diffusion::CameraEquation> coarsened(const std::vector<diffusion::Ca
   return out;
 }
 
+std::vector<diffusion::CameraRay> coarsened(const std::vector<diffusion::CameraRay>& fine,
+                                            const FaceMeans& seen) {
+  if (fine.empty()) return {};
+  std::vector<diffusion::CameraRay> out(seen.size(), diffusion::CameraRay{0.0, 0.0, 0.0});
+  seen.for_each([&](std::size_t c, std::size_t f, double share) {
+    out[c].column += share * fine[f].column;
+    out[c].row += share * fine[f].row;
+    out[c].stretch += share * fine[f].stretch;
+  });
+  return out;
+}
+
 std::array<AxisTerms, 3> for_axes(const Block& from, const Block& to, AxisTerms (*make)(int, int)) {
   return {make(from.nx, to.nx), make(from.ny, to.ny), make(from.nz, to.nz)};
 }
@@ -158,6 +170,7 @@ ChannelProblem coarsened(const ChannelProblem& problem, const Block& coarse) {
                      .boundary = problem.boundary,
                      .source = problem.source,
                      .camera = coarsened(problem.camera, seen),
+                     .rays = coarsened(problem.rays, seen),
                      .illuminations = {},
                      .data_count = 0,
                      .noise = 0.0};

@@ -69,6 +69,7 @@ Material refined(const Material& material) {
 Dataset refined(Dataset dataset) {
   dataset.block = refined(dataset.block);
   dataset.view_cosine = refined(dataset.view_cosine);
+  dataset.view_direction = refined(dataset.view_direction);
   for (Illumination& i : dataset.illuminations) {
     i.irradiance = refined(i.irradiance);
     i.radiance = refined(i.radiance);

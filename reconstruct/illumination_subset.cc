@@ -31,6 +31,7 @@ ChannelProblem with_illuminations(const ChannelProblem& problem,
                       .boundary = problem.boundary,
                       .source = problem.source,
                       .camera = problem.camera,
+                      .rays = problem.rays,
                       .illuminations = {},
                       .data_count = 0,
                       .noise = 0.0};

@@ -44,9 +44,9 @@ struct Information::Point {
   ChannelCoefficients coefficients;
   std::vector<double> diffusion_less_mean;  // of the logarithms
   std::vector<double> absorption_less_mean;
-  FluxResiduals probes;  // one a cell of the seen face
-  FieldBatch fluence;    // per illumination
-  FieldBatch adjoint;    // per probe
+  RadianceResiduals probes;  // one a cell of the seen face
+  FieldBatch fluence;        // per illumination
+  FieldBatch adjoint;        // per probe
 };
 
 Information::Information(const ChannelProblem& problem,
@@ -113,8 +113,8 @@ Result<void> Information::solve_all(Point& at, std::stop_token stop) {
   at.fluence = *std::move(fluence);
   const std::size_t pixels = at.problem.camera.size();
   at.probes.assign(pixels, std::vector<double>(pixels, 0.0));
-  for (std::size_t x = 0; x < pixels; ++x) at.probes[x][x] = at.problem.camera[x].flux_gain;
-  auto adjoint = solve(adjoint_right_sides(at.problem, lit.medium, at.probes), std::move(stop));
+  for (std::size_t x = 0; x < pixels; ++x) at.probes[x][x] = 1.0;
+  auto adjoint = solve(adjoint_right_sides(at.problem, lit, at.probes), std::move(stop));
   if (!adjoint) return adjoint.error();
   at.adjoint = *std::move(adjoint);
   return ok();

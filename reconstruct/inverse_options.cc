@@ -50,6 +50,10 @@ std::string_view to_string(Method method) {
   return "lbfgs";
 }
 
+std::string_view to_string(CameraLaw law) {
+  return law == CameraLaw::kRefractedRay ? "refracted_ray" : "surface";
+}
+
 std::string_view to_string(Model model) {
   constexpr std::array<std::string_view, 4> names{
       "auto", "homogeneous", "layered", "heterogeneous"};

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "base/dataset.h"
 #include "base/result.h"
 #include "reconstruct/diffusion/boundary.h"
 #include "reconstruct/diffusion/precision.h"
@@ -26,6 +27,13 @@ enum class Method : std::uint8_t {
   kAsPublished,  ///< Wang 2008, Table I (reconstruct/published_step.h), for comparison only
 };
 std::string_view to_string(Method method);  ///< "lbfgs" | "gauss_newton" | "as_published"
+
+/// What the camera is taken to see of the fluence (docs/physics.md, "Radiance towards a camera").
+enum class CameraLaw : std::uint8_t {
+  kRefractedRay,  ///< what is scattered along the refracted ray (diffusion/camera_rays.h)
+  kSurface,       ///< the P1 field under the surface (diffusion/camera_equation.h)
+};
+std::string_view to_string(CameraLaw law);  ///< "refracted_ray" | "surface"
 
 /// How much of a sample may vary.
 enum class Model : std::uint8_t {
@@ -61,6 +69,7 @@ struct InverseOptions {
   diffusion::SourceModel source = diffusion::SourceModel::kCollimated;
   diffusion::Deposit deposit = diffusion::Deposit::kCentroid;
   diffusion::BoundaryModel boundary = diffusion::BoundaryModel::kTwoMoment;
+  CameraLaw camera = CameraLaw::kRefractedRay;  ///< without Dataset::view_direction kSurface
   /// Relative error of the diffusion model: (model_error hypot(L, l))^2 is added to the variance of each datum, l the
   /// root mean square of its picture, since the model's error far from the light does not fall with L; >= 0.
   double model_error = 0.01;
@@ -93,5 +102,10 @@ struct InverseOptions {
   diffusion::Precision precision = diffusion::Precision::kSingle;
 };
 Result<void> validate(const InverseOptions& options);  ///< "tolerance = 0; expected > 0"
+
+/// Whether the camera is taken to see along refracted rays: where it is asked for, and the dataset knows their directions.
+inline bool along_rays(const Dataset& dataset, const InverseOptions& options) {
+  return options.camera == CameraLaw::kRefractedRay && !dataset.view_direction.samples().empty();
+}
 
 }  // namespace opaline::reconstruct

@@ -33,7 +33,7 @@ class InversionEngine {
  public:
   virtual ~InversionEngine() = default;
   /// Starts from a state of the whole parametrization. Null where the options ask for what this engine does not do (a
-  /// method, a regulariser): the objective on a FluenceSolver then does it. The problem outlives the minimiser; one
+  /// method, a camera law): the objective on a FluenceSolver then does it. The problem outlives the minimiser; one
   /// minimiser an engine at a time.
   virtual Result<std::unique_ptr<Minimiser>> begin(const ChannelProblem& problem,
                                                    const InverseOptions& options,

@@ -74,24 +74,24 @@ Result<void> Objective::solve_forward(const ChannelCoefficients& coefficients,
 // Fills radiance_ from the fluence.
 void Objective::observe() { radiance_ = radiance(problem_, *lit_, fluence_); }
 
-// Fills flux_residual_ with r = w (L - L*) dL/dJ_n; returns chi-squared.
+// Fills radiance_residual_ with dJ/dL = w (L - L*); returns chi-squared.
 double Objective::residuals() {
   double chi_squared = 0.0;
-  flux_residual_.resize(radiance_.size());
+  radiance_residual_.resize(radiance_.size());
   for (std::size_t m = 0; m < radiance_.size(); ++m) {
     const ChannelIllumination& data = problem_.illuminations[m];
-    flux_residual_[m].resize(radiance_[m].size());
+    radiance_residual_[m].resize(radiance_[m].size());
     for (std::size_t x = 0; x < radiance_[m].size(); ++x) {
       const double misfit = radiance_[m][x] - data.radiance[x];
       chi_squared += data.weight[x] * misfit * misfit;
-      flux_residual_[m][x] = data.weight[x] * misfit * problem_.camera[x].flux_gain;
+      radiance_residual_[m][x] = data.weight[x] * misfit;
     }
   }
   return chi_squared;
 }
 
 Result<void> Objective::solve_adjoint(std::stop_token stop) {
-  return solve(adjoint_right_sides(problem_, lit_->medium, flux_residual_), adjoint_, stop);
+  return solve(adjoint_right_sides(problem_, *lit_, radiance_residual_), adjoint_, stop);
 }
 
 void Objective::regularize(const ChannelCoefficients& c,
@@ -103,7 +103,8 @@ void Objective::regularize(const ChannelCoefficients& c,
 }
 
 void Objective::add_gradient(const ChannelCoefficients& c, Evaluation& out) const {
-  MediumGradient gradient = medium_gradient(problem_, *lit_, fluence_, adjoint_, flux_residual_);
+  MediumGradient gradient =
+      medium_gradient(problem_, *lit_, fluence_, adjoint_, radiance_residual_);
   for (std::size_t i = 0; i < problem_.block.cell_count(); ++i) {
     gradient.diffusion[i] *= lit_->medium.diffusion[i];
     gradient.absorption[i] *= c.absorption[i];

@@ -84,7 +84,7 @@ class Objective {
   diffusion::FieldBatch fluence_;
   diffusion::FieldBatch adjoint_;
   std::vector<std::vector<double>> radiance_;  // per illumination
-  FluxResiduals flux_residual_;
+  RadianceResiduals radiance_residual_;
 };
 
 /// (log sigma_s', log sigma_a), all sigma_s' first, and back.

@@ -209,6 +209,8 @@ Dataset on_grid(const Dataset& dataset, const Block& block) {
   Dataset out = dataset;
   out.block = block;
   out.view_cosine = mean(dataset.view_cosine, seen);
+  if (!dataset.view_direction.samples().empty())
+    out.view_direction = mean(dataset.view_direction, seen);
   for (std::size_t m = 0; m < dataset.illuminations.size(); ++m) {
     const Illumination& fine = dataset.illuminations[m];
     out.illuminations[m].irradiance = mean(fine.irradiance, lit);

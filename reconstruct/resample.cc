@@ -106,17 +106,26 @@ ChannelProblem coarsen(const ChannelProblem& problem, const Block& coarse) {
   };
   ChannelProblem out = problem;
   out.block = coarse;
-  std::vector<double> source_gain;
-  std::vector<double> flux_gain;
-  for (const auto& c : problem.camera) {
-    source_gain.push_back(c.source_gain);
-    flux_gain.push_back(c.flux_gain);
-  }
-  source_gain = seen(cell_means, std::move(source_gain));
-  flux_gain = seen(cell_means, std::move(flux_gain));
+  const auto mean = [&](const auto& values, auto member) {
+    std::vector<double> raster;
+    for (const auto& value : values) raster.push_back(value.*member);
+    return seen(cell_means, std::move(raster));
+  };
+  using diffusion::CameraEquation;
+  using diffusion::CameraRay;
+  const auto source_gain = mean(problem.camera, &CameraEquation::source_gain);
+  const auto flux_gain = mean(problem.camera, &CameraEquation::flux_gain);
   out.camera.clear();
+  out.rays.clear();
   for (std::size_t x = 0; x < flux_gain.size(); ++x)
     out.camera.push_back({source_gain[x], flux_gain[x]});
+  if (!problem.rays.empty()) {
+    const auto column = mean(problem.rays, &CameraRay::column);
+    const auto row = mean(problem.rays, &CameraRay::row);
+    const auto stretch = mean(problem.rays, &CameraRay::stretch);
+    for (std::size_t x = 0; x < stretch.size(); ++x)
+      out.rays.push_back({column[x], row[x], stretch[x]});
+  }
   for (ChannelIllumination& i : out.illuminations) {
     i.irradiance =
         resample_face(cell_means, problem.block, coarse, problem.lit_face, std::move(i.irradiance));

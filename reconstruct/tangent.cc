@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/ensure.h"
+#include "reconstruct/diffusion/medium.h"
 #include "reconstruct/solve_check.h"
 
 namespace opaline::reconstruct {
@@ -27,26 +28,6 @@ MediumChange change_of(const ChannelCoefficients& c,
   return change;
 }
 
-// dg_b of one face, one value a cell of it: g_b^2 h / (2 kappa^2) dkappa.
-std::vector<double> conductance_change(const diffusion::Medium& medium,
-                                       const diffusion::Boundary& boundary,
-                                       Face face,
-                                       const MediumChange& change) {
-  const Block& block = medium.block;
-  const double h = block.spacing()[axis_of(face)];
-  std::vector<double> moved;
-  moved.reserve(block.face_cell_count(face));
-  for (int row = 0; row < block.face_height(face); ++row) {
-    for (int column = 0; column < block.face_width(face); ++column) {
-      const std::size_t cell = block.cell_behind(face, column, row);
-      const double kappa = medium.diffusion[cell];
-      const double gb = boundary.conductance(h, kappa);
-      moved.push_back(gb * gb * h / (2.0 * kappa * kappa) * change.diffusion[cell]);
-    }
-  }
-  return moved;
-}
-
 /// dK: the seven-point matrix with the derivatives of its conductances, zero beyond the block.
 class MatrixChange {
  public:
@@ -60,7 +41,7 @@ class MatrixChange {
     const Block& block = medium.block;
     for (double& d : diagonal_) d *= block.cell_volume();
     for (const Face face : kFaces) {
-      const auto moved = conductance_change(medium, boundary, face, change);
+      const auto moved = diffusion::conductance_change(medium, boundary, face, change);
       std::size_t f = 0;
       for (int row = 0; row < block.face_height(face); ++row)
         for (int column = 0; column < block.face_width(face); ++column, ++f)
@@ -162,35 +143,19 @@ FieldBatch Tangent::moved_right_sides(const MediumChange& change,
   return b;
 }
 
-// dJ_n = g_b dphi + dg_b (phi - S) + dX, then sqrt(w) flux_gain dJ_n.
 Result<std::vector<double>> Tangent::apply(std::span<const double> v, std::stop_token stop) {
   ENSURE(v.size() == parameter_count());
   const MediumChange change = change_of(coefficients_, lit_.medium, v);
   std::vector<std::vector<double>> escape;
   const auto moved = solve(moved_right_sides(change, escape), std::move(stop));
   if (!moved) return moved.error().in("tangent");
-  const bool is_lit = problem_->seen_face == problem_->lit_face;
-  const Face face = problem_->seen_face;
-  const Block& block = problem_->block;
-  const double h = block.spacing()[axis_of(face)];
-  const auto dg = conductance_change(lit_.medium, problem_->boundary, face, change);
+  const auto pictures = radiance_change(*problem_, lit_, fluence_, change, *moved, escape);
   std::vector<double> out;
   out.reserve(data_count());
-  for (std::size_t m = 0; m < problem_->illuminations.size(); ++m) {
+  for (std::size_t m = 0; m < pictures.size(); ++m) {
     const auto& weight = problem_->illuminations[m].weight;
-    const double* phi = fluence_.field(static_cast<int>(m));
-    const double* d_phi = moved->field(static_cast<int>(m));
-    std::size_t f = 0;
-    for (int row = 0; row < block.face_height(face); ++row) {
-      for (int column = 0; column < block.face_width(face); ++column, ++f) {
-        const std::size_t cell = block.cell_behind(face, column, row);
-        const double source = is_lit ? lit_.surface[m].source[f] : 0.0;
-        const double gb = problem_->boundary.conductance(h, lit_.medium.diffusion[cell]);
-        double flux = gb * d_phi[cell] + dg[f] * (phi[cell] - source);
-        if (is_lit) flux += escape[m][f];
-        out.push_back(std::sqrt(weight[f]) * problem_->camera[f].flux_gain * flux);
-      }
-    }
+    for (std::size_t f = 0; f < weight.size(); ++f)
+      out.push_back(std::sqrt(weight[f]) * pictures[m][f]);
   }
   return out;
 }
@@ -199,15 +164,13 @@ Result<std::vector<double>> Tangent::apply_adjoint(std::span<const double> y,
                                                    std::stop_token stop) {
   ENSURE(y.size() == data_count());
   const std::size_t pixels = problem_->camera.size();
-  FluxResiduals residuals;
+  RadianceResiduals residuals;
   for (std::size_t m = 0; m < problem_->illuminations.size(); ++m) {
     const auto& weight = problem_->illuminations[m].weight;
     auto& r = residuals.emplace_back(pixels);
-    for (std::size_t f = 0; f < pixels; ++f)
-      r[f] = std::sqrt(weight[f]) * problem_->camera[f].flux_gain * y[m * pixels + f];
+    for (std::size_t f = 0; f < pixels; ++f) r[f] = std::sqrt(weight[f]) * y[m * pixels + f];
   }
-  const auto adjoint =
-      solve(adjoint_right_sides(*problem_, lit_.medium, residuals), std::move(stop));
+  const auto adjoint = solve(adjoint_right_sides(*problem_, lit_, residuals), std::move(stop));
   if (!adjoint) return adjoint.error().in("adjoint");
   auto gradient = medium_gradient(*problem_, lit_, fluence_, *adjoint, residuals);
   for (std::size_t i = 0; i < gradient.diffusion.size(); ++i) {

@@ -15,7 +15,7 @@ namespace opaline::reconstruct {
 /// The discrete forward model of one channel, linearised at a point: the Jacobian J of the whitened
 /// radiances sqrt(w) L by p = (log sigma_s', log sigma_a), all sigma_s' first, as products.
 ///
-///   apply:           K dphi = db - dK phi,   dL = flux_gain (dg_b (phi - S) + g_b dphi + dX)
+///   apply:           K dphi = db - dK phi,   dL by radiance_change() (reconstruct/observation.h)
 ///   apply_adjoint:   the discrete adjoint gradient (docs/physics.md, "Gradient, in full") with
 ///                    sqrt(w) y in place of w (L - L*)
 ///

@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
+#include "base/face_view.h"
+#include "reconstruct/diffusion/camera_rays.h"
 #include "reconstruct/diffusion/fresnel.h"
 #include "reconstruct/diffusion/medium.h"
 
@@ -53,12 +57,15 @@ class Channel {
   Channel(const Material& material,
           int channel,
           const diffusion::Boundary& boundary,
-          diffusion::SourceOptions source)
+          const TranslucencyOptions& options)
       : channel_(channel),
         ior_(material.ior),
         boundary_(boundary),
-        source_(source),
-        medium_(diffusion::make_medium(material.block, material.channels[channel], boundary)) {}
+        source_(options.source),
+        medium_(diffusion::make_medium(material.block, material.channels[channel], boundary)) {
+    if (!options.eye) return;
+    for (const Face face : kFaces) look_at(face, *options.eye);
+  }
 
   const diffusion::Medium& medium() const { return medium_; }
 
@@ -82,12 +89,50 @@ class Channel {
     return *made;
   }
 
+  struct View {
+    diffusion::CameraRays rays;
+    std::vector<double> flux_gain;  // 2 A + 3 mu_i
+  };
+
+  void look_at(Face face, Vec3 eye) {
+    const FaceView seen = view_of_face(medium_.block, face, eye);
+    if (!(*std::ranges::min_element(seen.cosine.samples()) > 0.0F)) return;
+    std::vector<diffusion::CameraRay> rays;
+    std::vector<double> flux_gain;
+    for (int row = 0; row < seen.cosine.height(); ++row) {
+      for (int column = 0; column < seen.cosine.width(); ++column) {
+        rays.push_back(diffusion::camera_ray(
+            ior_, seen.direction.at(column, row, 0), seen.direction.at(column, row, 1)));
+        flux_gain.push_back(2.0 * boundary_.a + 3.0 / rays.back().stretch);
+      }
+    }
+    views_[static_cast<std::size_t>(face)].emplace(
+        View{diffusion::CameraRays(medium_, boundary_, face, rays), std::move(flux_gain)});
+  }
+
+  // The net flux whose P1 radiance is what the rays see.
+  void see(const View& view,
+           std::span<const double> phi,
+           const diffusion::SurfaceTerms& terms,
+           std::span<double> flux) const {
+    view.rays.gather(phi.data(), terms.source, flux);
+    for (std::size_t i = 0; i < flux.size(); ++i) {
+      const double source = terms.source.empty() ? 0.0 : terms.source[i];
+      const double escape = terms.escape.empty() ? 0.0 : terms.escape[i];
+      flux[i] = (flux[i] - source) / view.flux_gain[i] + escape;
+    }
+  }
+
   void write_face(Face face,
                   std::span<const double> phi,
                   const diffusion::SurfaceTerms& terms,
                   SurfaceField& field) const {
     std::vector<double> flux(medium_.block.face_cell_count(face));
-    diffusion::net_flux(medium_, boundary_, face, phi, terms.source, terms.escape, flux);
+    if (const auto& view = views_[static_cast<std::size_t>(face)]) {
+      see(*view, phi, terms, flux);
+    } else {
+      diffusion::net_flux(medium_, boundary_, face, phi, terms.source, terms.escape, flux);
+    }
     FaceField& out = field.faces[static_cast<std::size_t>(face)];
     for (std::size_t i = 0; i < flux.size(); ++i) {
       const double source = terms.source.empty() ? 0.0 : terms.source[i];
@@ -103,6 +148,7 @@ class Channel {
   diffusion::SourceOptions source_;
   diffusion::Medium medium_;
   std::array<std::optional<diffusion::FaceSource>, 6> entries_;
+  std::array<std::optional<View>, 6> views_;
 };
 
 SurfaceField dark(const Material& material) {
@@ -148,7 +194,7 @@ Result<std::vector<SurfaceField>> illuminate(const Material& material,
   std::vector<SurfaceField> fields(lights.size(), dark(material));
   if (lights.empty()) return fields;
   for (int c = 0; c < kColorChannels; ++c) {
-    Channel channel(material, c, *boundary, options.source);
+    Channel channel(material, c, *boundary, options);
     auto lit = illuminate_channel(channel, lights, options.solve, solver, stop, fields);
     if (!lit) return lit.error().in(fmt::format("{} channel", kChannelNames[c]));
   }

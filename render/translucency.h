@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "base/block.h"
 #include "base/image.h"
 #include "base/material.h"
+#include "base/pose.h"
 #include "base/result.h"
 #include "reconstruct/diffusion/boundary.h"
 #include "reconstruct/diffusion/fluence_solver.h"
@@ -26,6 +28,10 @@ struct TranslucencyOptions {
       reconstruct::diffusion::BoundaryModel::kTwoMoment;
   reconstruct::diffusion::SourceOptions source;
   reconstruct::diffusion::SolveOptions solve;
+  /// Where the pictures will be taken from, mm. Faces turned to it then shine towards it as the fluence along refracted
+  /// rays makes them (reconstruct/diffusion/camera_rays.h): J_n and phi_s = S + 2 A J_n are those of the P1 field of that
+  /// radiance. From elsewhere, and without an eye, they are the P1 field's own.
+  std::optional<Vec3> eye;
 };
 
 /// How a block of the material glows under each light: the diffusion equation, solved channel by channel for all lights

@@ -25,6 +25,11 @@ constexpr const char* kSidecar = "dataset.json";
 constexpr int kMaxIlluminations = 4096;
 constexpr int kSeenChannels = 7;   // of one illumination: radiance, variance, mask
 constexpr int kLightChannels = 3;  // irradiance
+constexpr int kDirectionChannels = 2;
+
+std::array<std::string, kDirectionChannels> direction_channels() {
+  return {"view_direction.column", "view_direction.row"};
+}
 constexpr std::size_t kFileLimit = std::size_t{4} << 30;
 
 std::vector<std::string> rgb(const std::string& prefix) {
@@ -75,6 +80,10 @@ Result<void> check(const Dataset& set) {
   if (!fits(set.view_cosine, set.block, set.seen_face, 1)) {
     return invalid_argument("dataset: view_cosine does not fit the seen face");
   }
+  if (!set.view_direction.samples().empty() &&
+      !fits(set.view_direction, set.block, set.seen_face, kDirectionChannels)) {
+    return invalid_argument("dataset: view_direction does not fit the seen face");
+  }
   std::set<std::string> names;
   for (const Illumination& light : set.illuminations) {
     if (!valid_name(light.name) || !names.insert(light.name).second) {
@@ -94,12 +103,19 @@ Result<void> check(const Dataset& set) {
 
 ImageFile seen_image(const Dataset& set) {
   const int count = static_cast<int>(set.illuminations.size());
-  Image<float> pixels(set.view_cosine.width(), set.view_cosine.height(), 1 + kSeenChannels * count);
+  const bool directed = !set.view_direction.samples().empty();
+  const int before = directed ? 1 + kDirectionChannels : 1;
+  Image<float> pixels(
+      set.view_cosine.width(), set.view_cosine.height(), before + kSeenChannels * count);
   std::vector<std::string> channels{"view_cosine"};
   copy_in(pixels, 0, set.view_cosine);
+  if (directed) {
+    for (const std::string& name : direction_channels()) channels.push_back(name);
+    copy_in(pixels, 1, set.view_direction);
+  }
   for (int i = 0; i < count; ++i) {
     const Illumination& light = set.illuminations[static_cast<std::size_t>(i)];
-    const int first = 1 + kSeenChannels * i;
+    const int first = before + kSeenChannels * i;
     copy_in(pixels, first, light.radiance);
     copy_in(pixels, first + 3, light.radiance_variance);
     copy_in(pixels, first + 6, light.mask);
@@ -220,6 +236,12 @@ Result<void> fill_seen(const ImageFile& file, Dataset& set) {
   const auto cosine = select_channels(file, std::array<std::string, 1>{"view_cosine"});
   if (!cosine) return cosine.error();
   set.view_cosine = *cosine;
+  const auto directions = direction_channels();
+  if (std::ranges::find(file.channels, directions.front()) != file.channels.end()) {
+    const auto direction = select_channels(file, directions);
+    if (!direction) return direction.error();
+    set.view_direction = *direction;
+  }
   for (Illumination& light : set.illuminations) {
     const auto pixels = select_channels(file, seen_channels(light.name));
     if (!pixels) return pixels.error();
@@ -263,7 +285,8 @@ Result<Dataset> read_dataset(const fs::path& directory) {
   auto set = parse_header(directory / kSidecar, *sidecar);
   if (!set) return set.error();
   const int count = static_cast<int>(set->illuminations.size());
-  const auto seen = read_image(directory / kSeenFile, *sidecar, 1 + kSeenChannels * count);
+  const auto seen =
+      read_image(directory / kSeenFile, *sidecar, 1 + kDirectionChannels + kSeenChannels * count);
   if (!seen) return seen.error();
   const auto light =
       read_image(directory / kLightFile, *sidecar, std::max(1, kLightChannels * count));

@@ -8,12 +8,12 @@
 
 namespace opaline {
 
-inline constexpr int kDatasetFormat = 1;
+inline constexpr int kDatasetFormat = 2;  ///< 1: without view_direction
 
 /// A dataset on disk, in `directory`:
 ///
-///   dataset.exr        the seen face: view_cosine; per illumination NAME.radiance.R G B,
-///                      NAME.variance.R G B and NAME.mask (0 or 1)
+///   dataset.exr        the seen face: view_cosine, view_direction.column and .row; per illumination
+///                      NAME.radiance.R G B, NAME.variance.R G B and NAME.mask (0 or 1)
 ///   dataset_light.exr  the lit face: per illumination NAME.irradiance.R G B
 ///   dataset.json       format version, block, ior, faces, the illuminations in order, SHA-256 of
 ///                      both

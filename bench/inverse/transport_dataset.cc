@@ -6,6 +6,9 @@
 #include <cmath>
 #include <random>
 
+#include "base/face_view.h"
+#include "sim/light_transport.h"
+
 namespace opaline::bench {
 namespace {
 
@@ -67,26 +70,16 @@ void add_noise(double noise, std::mt19937& random, Illumination& i) {
   }
 }
 
-Image<float> view_cosine(const TransportResponses& t) {
-  Image<float> cosine(t.block.face_width(t.seen_face), t.block.face_height(t.seen_face), 1);
-  for (int y = 0; y < cosine.height(); ++y) {
-    for (int x = 0; x < cosine.width(); ++x) {
-      const Vec3 to_camera =
-          normalized(t.camera_centre - t.block.face_cell_centre(t.seen_face, x, y));
-      const double along[] = {to_camera.x, to_camera.y, to_camera.z};
-      cosine.at(x, y) = static_cast<float>(std::abs(along[axis_of(t.seen_face)]));
-    }
-  }
-  return cosine;
-}
-
 Dataset empty_dataset(const TransportResponses& t) {
   Dataset dataset;
   dataset.block = t.block;
   dataset.ior = t.ior;
   dataset.lit_face = t.lit_face;
   dataset.seen_face = t.seen_face;
-  dataset.view_cosine = view_cosine(t);
+  FaceView view = view_of_face(t.block, t.seen_face, t.camera_centre);
+  dataset.view_cosine = std::move(view.cosine);
+  if (t.generator == sim::transport_generator())  // finite elements see the surface
+    dataset.view_direction = std::move(view.direction);
   return dataset;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/face_view.h"
 #include "daemon/report/surface_radiance.h"
 
 namespace opaline::daemon {
@@ -61,7 +62,7 @@ Result<ChannelErrors> bssrdf_error(const Material& material,
     return invalid_argument("the material and the stored light transport have different grids");
   }
   const Image<float> cosines =
-      view_cosines(responses.block, responses.seen_face, responses.camera_centre);
+      view_of_face(responses.block, responses.seen_face, responses.camera_centre).cosine;
   ChannelErrors errors;
   for (int row = 0; row < responses.patches_y; ++row) {  // a row of patches at a time
     std::vector<render::Light> lights;

@@ -69,8 +69,11 @@ Result<ReportData> read_session(const SessionDirectory& session) {
   return data;
 }
 
-render::TranslucencyOptions translucency(const config::SessionConfig& config) {
+/// As the reconstruction had it, and as it is seen from `eye`.
+render::TranslucencyOptions translucency(const ReportData& data, Vec3 eye) {
+  const config::SessionConfig& config = data.config;
   render::TranslucencyOptions options;
+  if (reconstruct::along_rays(data.dataset, config.reconstruction)) options.eye = eye;
   options.boundary = config.reconstruction.boundary;
   options.source = {config.reconstruction.source, config.reconstruction.deposit};
   options.solve.tolerance = config.preview.tolerance;
@@ -135,7 +138,11 @@ Result<void> SessionReport::light_the_material() {
     const auto batch =
         all.subspan(fields_.size(), std::min(kLightsAtATime, all.size() - fields_.size()));
     auto fields =
-        render::illuminate(data_.material, batch, translucency(data_.config), *solver_, job_.stop);
+        render::illuminate(data_.material,
+                           batch,
+                           translucency(data_, data_.config.rig.calibration.camera.model.centre()),
+                           *solver_,
+                           job_.stop);
     if (!fields) return fields.error().in("lighting the material");
     std::ranges::move(*fields, std::back_inserter(fields_));
     progress.done(static_cast<double>(fields_.size()) / static_cast<double>(all.size()));
@@ -208,7 +215,7 @@ Result<void> SessionReport::compare_with_transport() {
   auto errors = bssrdf_error(
       data_.material,
       *responses,
-      translucency(data_.config),
+      translucency(data_, responses->camera_centre),
       *solver_,
       [&](double share) { progress.done(share); },
       job_.stop);

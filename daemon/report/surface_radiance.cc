@@ -7,18 +7,6 @@
 
 namespace opaline::daemon {
 
-Image<float> view_cosines(const Block& block, Face face, Vec3 camera_centre) {
-  Image<float> cosines(block.face_width(face), block.face_height(face), 1);
-  for (int row = 0; row < cosines.height(); ++row) {
-    for (int column = 0; column < cosines.width(); ++column) {
-      const Vec3 d = normalized(camera_centre - block.face_cell_centre(face, column, row));
-      const double along = axis_of(face) == 0 ? d.x : axis_of(face) == 1 ? d.y : d.z;
-      cosines.at(column, row) = static_cast<float>(is_max(face) ? along : -along);
-    }
-  }
-  return cosines;
-}
-
 Image<float> surface_radiance(const render::SurfaceField& field,
                               Face face,
                               const Image<float>& cosines) {

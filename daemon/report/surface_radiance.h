@@ -2,13 +2,9 @@
 
 #include "base/block.h"
 #include "base/image.h"
-#include "base/pose.h"
 #include "render/surface_field.h"
 
 namespace opaline::daemon {
-
-/// Cosine of the direction from each cell of a face to a camera's centre with the outward normal.
-Image<float> view_cosines(const Block& block, Face face, Vec3 camera_centre);
 
 /// Radiance of a face's cells at those cosines, 3 channels, by the camera equation of the P1 field
 ///

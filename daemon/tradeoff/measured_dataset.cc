@@ -67,6 +67,8 @@ std::function<Result<double>(const Material&, std::stop_token)> judge_of(
     options.boundary = data.options.boundary;
     options.source = {data.options.source, data.options.deposit};
     options.solve.tolerance = kTolerance;
+    if (reconstruct::along_rays(data.dataset, data.options))
+      options.eye = data.truth->camera_centre;
     const auto solver = reconstruct::host::make_host_solver({.threads = data.options.threads});
     const auto errors = bssrdf_error(
         material, *data.truth, options, *solver, [](double) {}, std::move(stop));

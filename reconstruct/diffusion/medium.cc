@@ -37,4 +37,23 @@ void net_flux(const Medium& medium,
   }
 }
 
+std::vector<double> conductance_change(const Medium& medium,
+                                       const Boundary& boundary,
+                                       Face face,
+                                       const MediumChange& change) {
+  const Block& block = medium.block;
+  const double h = block.spacing()[axis_of(face)];
+  std::vector<double> moved;
+  moved.reserve(block.face_cell_count(face));
+  for (int row = 0; row < block.face_height(face); ++row) {
+    for (int column = 0; column < block.face_width(face); ++column) {
+      const std::size_t cell = block.cell_behind(face, column, row);
+      const double kappa = medium.diffusion[cell];
+      const double gb = boundary.conductance(h, kappa);
+      moved.push_back(gb * gb * h / (2.0 * kappa * kappa) * change.diffusion[cell]);
+    }
+  }
+  return moved;
+}
+
 }  // namespace opaline::reconstruct::diffusion

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "base/block.h"
 #include "base/material.h"
 #include "reconstruct/diffusion/boundary.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/diffusion/source.h"
 
 namespace opaline::reconstruct::diffusion {
 
@@ -25,5 +27,11 @@ void net_flux(const Medium& medium,
               std::span<const double> source,
               std::span<const double> escape,
               std::span<double> flux);
+
+/// dg_b of one face along a change, one value a cell of it: g_b^2 h / (2 kappa^2) dkappa.
+std::vector<double> conductance_change(const Medium& medium,
+                                       const Boundary& boundary,
+                                       Face face,
+                                       const MediumChange& change);
 
 }  // namespace opaline::reconstruct::diffusion

@@ -3,29 +3,9 @@
 #include <cmath>
 
 #include "base/ensure.h"
+#include "reconstruct/diffusion/centroid.h"
 
 namespace opaline::reconstruct::diffusion {
-namespace {
-
-constexpr double kSeriesBelow =
-    0.05;  // where the closed forms of beta lose more to cancellation than the series to truncation
-
-// Centroid of e^(-t x) on [0, 1], as its distance before the middle.
-// `left` = e^(-t) and `lost` = 1 - e^(-t): 1 / (e^t - 1) = left / lost.
-double centroid_shift(double t, double left, double lost) {
-  const double s = t * t;
-  if (t < kSeriesBelow) return t * (1.0 / 12.0 - s / 720.0 + s * s / 30240.0);
-  return 0.5 - 1.0 / t + left / lost;
-}
-
-double centroid_shift_slope(double t, double left, double lost) {
-  const double s = t * t;
-  if (t < kSeriesBelow) return 1.0 / 12.0 - s / 240.0 + s * s / 6048.0;
-  return 1.0 / s - left / (lost * lost);
-}
-
-}  // namespace
-
 std::string_view to_string(SourceModel model) {
   return model == SourceModel::kCollimated ? "collimated" : "surface";
 }
@@ -64,18 +44,16 @@ FaceSource::RayCell FaceSource::ray_cell(const Medium& medium,
                                          double arriving) const {
   const double kappa = medium.diffusion[cell];
   const double absorption = medium.absorption[cell];
-  const double t = h_ / (3.0 * kappa);
-  const double left = std::exp(-t);
-  const double lost = -std::expm1(-t);
+  const Centroid along(h_ / (3.0 * kappa));
   const bool centroid = options_.deposit == Deposit::kCentroid;
   return {.cell = cell,
           .kappa = kappa,
           .absorption = absorption,
           .albedo = 1.0 - 3.0 * kappa * absorption,
-          .deposited = arriving * lost,
-          .remaining = arriving * left,
-          .beta = centroid ? centroid_shift(t, left, lost) : 0.0,
-          .beta_slope = centroid ? centroid_shift_slope(t, left, lost) : 0.0};
+          .deposited = arriving * along.lost,
+          .remaining = arriving * along.left,
+          .beta = centroid ? along.shift() : 0.0,
+          .beta_slope = centroid ? along.shift_slope() : 0.0};
 }
 
 double FaceSource::first_escape(const RayCell& first) const {

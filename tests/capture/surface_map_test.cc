@@ -125,7 +125,7 @@ TEST(SurfaceMap, KnowsTheCosineToTheCamera) {
   const auto map = SurfaceMap::create(kBlock, Face::kZMax, model);
   ASSERT_TRUE(map);
   const Vec3 to_camera = model.centre() - kBlock.face_cell_centre(Face::kZMax, 11, 0);
-  EXPECT_NEAR(map->view_cosine().at(11, 0), to_camera.z / length(to_camera), 1e-6);
+  EXPECT_NEAR(map->view().cosine.at(11, 0), to_camera.z / length(to_camera), 1e-6);
 }
 
 TEST(SurfaceMap, SeesEveryFaceFromItsOutside) {

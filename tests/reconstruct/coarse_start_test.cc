@@ -31,6 +31,7 @@ class CoarseStart : public testing::Test {
         .boundary = boundary,
         .source = {},
         .camera = std::vector(face, diffusion::camera_equation(1.3, boundary, 1.0)),
+        .rays = {},
         .illuminations = std::vector<ChannelIllumination>(2),
         .data_count = 2 * face};
     for (std::size_t m = 0; m < 2; ++m) {

@@ -123,6 +123,10 @@ TEST_P(Hessian, IsTheGradientsDerivativeWhereTheDataAreMet) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Light, Hessian, testing_problem::kEveryLight, testing_problem::case_name);
+INSTANTIATE_TEST_SUITE_P(Rays,
+                         Hessian,
+                         testing_problem::kEveryLightAlongRays,
+                         testing_problem::case_name);
 
 }  // namespace
 }  // namespace opaline::reconstruct

@@ -58,6 +58,7 @@ TEST_P(Gradient, MatchesRichardsonDifferencesInEveryParameter) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Light, Gradient, kEveryLight, case_name);
+INSTANTIATE_TEST_SUITE_P(Rays, Gradient, kEveryLightAlongRays, case_name);
 
 }  // namespace
 }  // namespace opaline::reconstruct

@@ -205,6 +205,7 @@ TEST_P(PosteriorOf, IsTheGaussianConditionalWrittenDownInCells) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Light, PosteriorOf, kEveryLight, case_name);
+INSTANTIATE_TEST_SUITE_P(Rays, PosteriorOf, kEveryLightAlongRays, case_name);
 
 const Case kBackLit{"", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 0.0};
 

@@ -117,6 +117,7 @@ TEST_P(TangentOf, TakesOneSolveAnIlluminationAndProduct) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Light, TangentOf, kEveryLight, case_name);
+INSTANTIATE_TEST_SUITE_P(Rays, TangentOf, kEveryLightAlongRays, case_name);
 
 // e^(-t) and everything behind it underflows at an optical depth of 2000 a cell.
 TEST(Tangent, StaysFiniteBehindOpaqueCells) {

@@ -5,12 +5,16 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/face_view.h"
+#include "reconstruct/diffusion/camera_equation.h"
 #include "reconstruct/diffusion/fresnel.h"
 #include "reconstruct/diffusion/reference_solver.h"
+#include "reconstruct/prediction.h"
 
 namespace opaline::render {
 namespace {
 
+using reconstruct::diffusion::Boundary;
 using reconstruct::diffusion::make_reference_solver;
 using reconstruct::diffusion::SourceModel;
 using testing::HasSubstr;
@@ -99,6 +103,46 @@ TEST(Illuminate, AnswersEachLightInItsPlaceAndSuperposes) {
   EXPECT_NEAR(on((*fields)[1], Face::kXMin).fluence.at(2, 2, 1),
               on(alone->front(), Face::kXMin).fluence.at(2, 2, 1),
               1e-6);
+}
+
+// The radiance towards the eye, by the P1 law from the field, is what the reconstruction predicts there; in float32.
+TEST(Illuminate, ShinesTowardsTheEyeAsTheReconstructionPredicts) {
+  const Block block{8, 6, 5, 0.8, 1.0, 0.6};
+  const Material material = material_of(block, {0.01, 0.02, 0.03});
+  const auto solver = make_reference_solver();
+  Light spot{Face::kXMax, Image<float>(6, 5, 3)};
+  for (int c = 0; c < 3; ++c) spot.irradiance.at(1, 3, c) = 2.0F;
+  const FaceView view = view_of_face(block, Face::kXMax, {30.0, -12.0, 20.0});
+  Dataset dataset{.block = block,
+                  .ior = material.ior,
+                  .lit_face = Face::kXMax,
+                  .seen_face = Face::kXMax,
+                  .view_cosine = view.cosine,
+                  .view_direction = view.direction,
+                  .illuminations = {{.name = "spot",
+                                     .held_out = false,
+                                     .irradiance = spot.irradiance,
+                                     .radiance = Image<float>(6, 5, 3),
+                                     .radiance_variance = Image<float>(6, 5, 3, 1.0F),
+                                     .mask = Image<std::uint8_t>(6, 5, 1, 1)}}};
+  TranslucencyOptions options = options_of(SourceModel::kCollimated);
+  options.eye = Vec3{30.0, -12.0, 20.0};
+  const auto fields = illuminate(material, std::vector{spot}, options, *solver, {});
+  ASSERT_TRUE(fields) << fields.error().message;
+  const auto predicted = reconstruct::predict(dataset, material, {.tolerance = 1e-9}, *solver, {});
+  ASSERT_TRUE(predicted) << predicted.error().message;
+  const FaceField& face = on(fields->front(), Face::kXMax);
+  const Boundary boundary = *reconstruct::diffusion::make_boundary(
+      reconstruct::diffusion::BoundaryModel::kTwoMoment, material.ior);
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 6; ++x) {
+      const auto p1 =
+          reconstruct::diffusion::camera_equation(material.ior, boundary, view.cosine.at(x, y));
+      const double source = face.fluence.at(x, y, 1) - 2.0 * boundary.a * face.net_flux.at(x, y, 1);
+      const double shown = p1.radiance(source, face.net_flux.at(x, y, 1));
+      EXPECT_NEAR(shown, predicted->front().at(x, y, 1), 2e-6 * predicted->front().at(1, 3, 1));
+    }
+  }
 }
 
 TEST(Illuminate, RefusesALightThatDoesNotFitTheFace) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/event_log.h"
+#include "base/face_view.h"
 #include "base/io/dataset_io.h"
 #include "base/io/image_io.h"
 #include "base/io/volume_io.h"
@@ -91,7 +92,7 @@ class Fabricator {
     const Block& block = what_.truth.block;
     dataset_.block = block;
     dataset_.ior = what_.truth.ior;
-    dataset_.view_cosine = daemon::view_cosines(block, Face::kZMax, what_.camera.centre());
+    dataset_.view_cosine = view_of_face(block, Face::kZMax, what_.camera.centre()).cosine;
     dataset_.illuminations = lights_on(block, what_.regions, what_.held_out);
     std::vector<render::Light> lights;
     for (const auto& light : dataset_.illuminations)

@@ -29,6 +29,7 @@ Dataset example() {
   set.lit_face = Face::kXMin;
   set.seen_face = Face::kZMax;
   set.view_cosine = raster<float>(5, 4, 1, 0.1);
+  set.view_direction = raster<float>(5, 4, 2, 0.2);
   for (const bool held_out : {false, true}) {
     Illumination& light = set.illuminations.emplace_back();
     light.name = held_out ? "held_out_0" : "region_0_0";
@@ -48,6 +49,7 @@ void expect_equal(const Dataset& a, const Dataset& b) {
   EXPECT_EQ(a.lit_face, b.lit_face);
   EXPECT_EQ(a.seen_face, b.seen_face);
   EXPECT_EQ(a.view_cosine, b.view_cosine);
+  EXPECT_EQ(a.view_direction, b.view_direction);
   ASSERT_EQ(a.illuminations.size(), b.illuminations.size());
   for (std::size_t i = 0; i < a.illuminations.size(); ++i) {
     const Illumination& p = a.illuminations[i];
@@ -131,11 +133,24 @@ TEST(DatasetFile, RefusesANewerVersion) {
   const testing::TemporaryDirectory dir;
   ASSERT_TRUE(write_dataset(system_files(), dir.path(), example()));
   std::string text = *read_text(dir.path() / "dataset.json");
-  text.replace(text.find("\"format\": 1"), 11, "\"format\": 2");
+  text.replace(text.find("\"format\": 2"), 11, "\"format\": 3");
   std::ofstream(dir.path() / "dataset.json") << text;
   const auto read = read_dataset(dir.path());
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("newer version (format 2"));
+  EXPECT_THAT(read.error().message, HasSubstr("newer version (format 3"));
+}
+
+TEST(DatasetFile, ReadsTheFormatBeforeDirections) {
+  const testing::TemporaryDirectory dir;
+  Dataset older = example();
+  older.view_direction = {};
+  ASSERT_TRUE(write_dataset(system_files(), dir.path(), older));
+  std::string text = *read_text(dir.path() / "dataset.json");
+  text.replace(text.find("\"format\": 2"), 11, "\"format\": 1");
+  std::ofstream(dir.path() / "dataset.json") << text;
+  const auto read = read_dataset(dir.path());
+  ASSERT_TRUE(read) << read.error().message;
+  expect_equal(*read, older);
 }
 
 TEST(DatasetFile, SurvivesAnySidecar) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/face_view.h"
 #include "base/io/image_io.h"
 #include "base/io/transport_io.h"
 #include "daemon/report/html.h"
@@ -119,7 +120,7 @@ TEST_F(SessionReportTest, ComparesWithStoredTransportPatchByPatch) {
   responses.patches_x = responses.patches_y = 2;
   responses.camera_centre = what_.camera.centre();
   responses.scene = sim::to_json(sim::SceneOptions{.block = responses.block});
-  const auto cosines = view_cosines(responses.block, Face::kZMax, responses.camera_centre);
+  const auto cosines = view_of_face(responses.block, Face::kZMax, responses.camera_centre).cosine;
   const auto solver = reconstruct::host::make_host_solver({});
   for (int patch = 0; patch < 4; ++patch) {
     render::Light light{Face::kZMin, Image<float>(12, 12, 3)};

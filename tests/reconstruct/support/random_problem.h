@@ -17,6 +17,7 @@ struct Case {
   Face seen;
   double regularization;
   Smoothness regularizer = Smoothness::kH1;
+  CameraLaw camera = CameraLaw::kSurface;
 };
 
 inline std::string case_name(const testing::TestParamInfo<Case>& info) { return info.param.name; }
@@ -45,12 +46,16 @@ inline ChannelProblem random_problem(const Case& c) {
       .boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, 1.3),
       .source = {c.source, c.deposit},
       .camera = {},
+      .rays = {},
       .illuminations = std::vector<ChannelIllumination>(2),
       .data_count = 0};
   const std::size_t seen = problem.block.face_cell_count(c.seen);
   for (std::size_t x = 0; x < seen; ++x) {
     problem.camera.push_back(diffusion::camera_equation(1.3, problem.boundary, uniform(random)));
   }
+  for (std::size_t x = 0; c.camera == CameraLaw::kRefractedRay && x < seen; ++x)
+    problem.rays.push_back(
+        diffusion::camera_ray(1.3, uniform(random) - 0.6, uniform(random) - 0.6));
   for (ChannelIllumination& i : problem.illuminations) {
     for (std::size_t x = 0; x < problem.block.face_cell_count(c.lit); ++x) {
       i.irradiance.push_back(uniform(random) > 0.5 ? uniform(random) : 0.0);
@@ -85,5 +90,39 @@ inline const auto kEveryLight =
                          Face::kZMax,
                          2.0,
                          Smoothness::kTotalVariation});
+
+/// The same seen along refracted rays.
+inline const auto kEveryLightAlongRays = testing::Values(Case{"BackLitRays",
+                                                              kCollimated,
+                                                              kCentroid,
+                                                              Face::kZMin,
+                                                              Face::kZMax,
+                                                              0.0,
+                                                              Smoothness::kH1,
+                                                              CameraLaw::kRefractedRay},
+                                                         Case{"FrontLitRays",
+                                                              kCollimated,
+                                                              kCentroid,
+                                                              Face::kZMax,
+                                                              Face::kZMax,
+                                                              0.0,
+                                                              Smoothness::kH1,
+                                                              CameraLaw::kRefractedRay},
+                                                         Case{"FrontLitSurfaceRays",
+                                                              kSurface,
+                                                              kCentroid,
+                                                              Face::kZMax,
+                                                              Face::kZMax,
+                                                              0.0,
+                                                              Smoothness::kH1,
+                                                              CameraLaw::kRefractedRay},
+                                                         Case{"FromTheSideRays",
+                                                              kCollimated,
+                                                              kCentroid,
+                                                              Face::kXMax,
+                                                              Face::kYMin,
+                                                              0.0,
+                                                              Smoothness::kH1,
+                                                              CameraLaw::kRefractedRay});
 
 }  // namespace opaline::reconstruct::testing_problem

@@ -135,6 +135,7 @@ ChannelProblem random_problem(const Case& c) {
       .boundary = *diffusion::make_boundary(diffusion::BoundaryModel::kTwoMoment, 1.3),
       .source = {c.source, c.deposit},
       .camera = {},
+      .rays = {},
       .illuminations = std::vector<ChannelIllumination>(static_cast<std::size_t>(c.illuminations)),
       .data_count = 1};
   for (std::size_t x = 0; x < c.block.face_cell_count(c.seen); ++x)
