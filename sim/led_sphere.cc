@@ -74,6 +74,24 @@ std::vector<BallTruth> balls_of(const LedSphereOptions& options) {
   return balls;
 }
 
+std::optional<SeenBall> see_ball(const std::vector<BallTruth>& balls,
+                                 const CameraModel& camera,
+                                 double x,
+                                 double y) {
+  const Vec3 eye = camera.centre();
+  const Vec3 way = normalized(camera.ray_direction({x, y}));
+  std::optional<SeenBall> seen;
+  double nearest = 0.0;
+  for (std::size_t b = 0; b < balls.size(); ++b) {
+    const auto met = meet(eye, way, balls[b]);
+    if (!met || (seen && nearest < *met)) continue;
+    nearest = *met;
+    const Vec3 point = eye + way * nearest;
+    seen = SeenBall{b, point, normalized(point - balls[b].centre), way * -1.0};
+  }
+  return seen;
+}
+
 double diffusion_of(double reduced_albedo, double translucency_mm) {
   return decay(reduced_albedo) * translucency_mm / 3.0;
 }
@@ -97,26 +115,10 @@ LedSphere::LedSphere(const LedSphereOptions& options,
 }
 
 void LedSphere::look(const CameraOptics& camera) {
-  const Vec3 eye = camera.model.centre();
   for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x) {
-      const Vec3 way = normalized(camera.model.ray_direction({x + 0.5, y + 0.5}));
-      std::optional<double> nearest;
-      std::size_t hit = 0;
-      for (std::size_t b = 0; b < balls_.size(); ++b) {
-        const auto met = meet(eye, way, balls_[b]);
-        if (!met || (nearest && *nearest < *met)) continue;
-        nearest = met;
-        hit = b;
-      }
-      if (!nearest) continue;
-      const Vec3 point = eye + way * *nearest;
-      seen_.push_back({static_cast<std::uint32_t>(y * width_ + x),
-                       static_cast<std::uint32_t>(hit),
-                       point,
-                       normalized(point - balls_[hit].centre),
-                       way * -1.0});
-    }
+    for (int x = 0; x < width_; ++x)
+      if (const auto seen = see_ball(balls_, camera.model, x + 0.5, y + 0.5))
+        seen_.push_back({*seen, static_cast<std::uint32_t>(y * width_ + x)});
 }
 
 Result<std::unique_ptr<const LedSphere>> LedSphere::create(const LedSphereOptions& options,

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -41,6 +42,17 @@ struct BallTruth {
   double radius_mm = 0.0;
 };
 std::vector<BallTruth> balls_of(const LedSphereOptions& options);
+/// What a camera sees at a place of its picture.
+struct SeenBall {
+  std::size_t ball = 0;
+  Vec3 point;
+  Vec3 normal;
+  Vec3 to_camera;
+};
+std::optional<SeenBall> see_ball(const std::vector<BallTruth>& balls,
+                                 const CameraModel& camera,
+                                 double x,
+                                 double y);
 double diffusion_of(double reduced_albedo,
                     double translucency_mm);  ///< D = l_d sqrt(3 (1 - alpha')) / 3, mm
 
@@ -69,12 +81,8 @@ class LedSphere : public LightPath {
 
  private:
   static constexpr std::size_t kSteps = 2048;  // of a table over cos(theta), from -1 to 1
-  struct Seen {                                // a pixel that sees a ball
-    std::uint32_t pixel;
-    std::uint32_t ball;
-    Vec3 point;
-    Vec3 normal;
-    Vec3 to_camera;
+  struct Seen : SeenBall {
+    std::uint32_t pixel = 0;
   };
   struct Table {
     std::vector<float> exitance;  // kSteps + 1 times 3 channels

@@ -14,6 +14,16 @@ namespace {
 constexpr BallTable::Row kRows[]{
 #include "reconstruct/spherical_gradient/ball_table.inc"
 };
+constexpr BallTable::Row kLowRows[]{
+#include "reconstruct/spherical_gradient/ball_table_low.inc"
+};
+constexpr BallTable::Row kHighRows[]{
+#include "reconstruct/spherical_gradient/ball_table_high.inc"
+};
+static_assert(std::size(kLowRows) == std::size(kRows) && std::size(kHighRows) == std::size(kRows));
+constexpr double kLow = 1.3;  // indices they were traced at
+constexpr double kMiddle = 1.4;
+constexpr double kHigh = 1.5;
 constexpr int kBendPowers = 4;    // x^1 ... x^4
 constexpr double kWhite = 0.003;  // relative: better than any white target
 constexpr int kIterations = 40;
@@ -24,7 +34,7 @@ double logit(double share) { return std::log(share / (1.0 - share)); }
 double power(double base, std::size_t exponent) {
   return std::pow(base, static_cast<double>(exponent));
 }
-double share(double logit) { return 1.0 / (1.0 + std::exp(-logit)); }
+double share_of(double logit) { return 1.0 / (1.0 + std::exp(-logit)); }
 
 /// Weighted least squares; chi^2 a degree of freedom with it.
 struct Fit {
@@ -123,6 +133,42 @@ Result<BallTable> BallTable::make(std::span<const Row> rows) {
 
 std::span<const BallTable::Row> BallTable::standard_rows() { return kRows; }
 
+Result<BallTable> BallTable::of_index(double ior) {
+  if (!(ior >= kLow && ior <= kHigh))
+    return invalid_argument(
+        fmt::format("refractive index {}; expected {} to {}, which were traced", ior, kLow, kHigh));
+  // Lagrange's polynomials
+  const std::array<double, 3> share{
+      (ior - kMiddle) * (ior - kHigh) / ((kLow - kMiddle) * (kLow - kHigh)),
+      (ior - kLow) * (ior - kHigh) / ((kMiddle - kLow) * (kMiddle - kHigh)),
+      (ior - kLow) * (ior - kMiddle) / ((kHigh - kLow) * (kHigh - kMiddle))};
+  std::vector<Row> rows;
+  for (std::size_t n = 0; n < std::size(kRows); ++n) {
+    const std::array<const Row*, 3> traced{&kLowRows[n], &kRows[n], &kHighRows[n]};
+    double log_ratio = 0.0;
+    double bright = 0.0;
+    double ratio_variance = 0.0;
+    double bright_variance = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Row& row = *traced[k];
+      log_ratio += share[k] * std::log(row.ratio);
+      bright += share[k] * logit(row.reflectance);
+      ratio_variance += std::pow(share[k] * row.ratio_deviation / row.ratio, 2);
+      bright_variance += std::pow(
+          share[k] * row.reflectance_deviation / row.reflectance / (1.0 - row.reflectance), 2);
+    }
+    const double reflectance = share_of(bright);
+    const double ratio = std::exp(log_ratio);
+    rows.push_back({kRows[n].reduced_albedo,
+                    kRows[n].curvature,
+                    reflectance,
+                    std::sqrt(bright_variance) * reflectance * (1.0 - reflectance),
+                    ratio,
+                    std::sqrt(ratio_variance) * ratio});
+  }
+  return make(rows);
+}
+
 const BallTable& BallTable::standard() {
   static const BallTable table = [] {
     Result<BallTable> made = make(kRows);
@@ -161,7 +207,7 @@ BallTable::Value BallTable::logit_reflectance(double u, double x) const {
 
 BallTable::Light BallTable::light(double reduced_albedo, double curvature) const {
   const double u = std::log(decay(reduced_albedo));
-  return {share(logit_reflectance(u, curvature).value), std::exp(log_ratio(u, curvature).value)};
+  return {share_of(logit_reflectance(u, curvature).value), std::exp(log_ratio(u, curvature).value)};
 }
 
 double BallTable::decay_of(double reflectance, double curvature) const {

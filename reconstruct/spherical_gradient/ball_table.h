@@ -56,6 +56,9 @@ class BallTable {
   /// The balls of index 1.4 that come with the program.
   static const BallTable& standard();
   static std::span<const Row> standard_rows();
+  /// Balls of any index from 1.3 to 1.5: ln r and logit R of those traced at 1.3, 1.4 and 1.5 as parabolas of the index.
+  /// Errors: kInvalidArgument for another one.
+  static Result<BallTable> of_index(double ior);
 
   Light light(double reduced_albedo, double curvature) const;
   /// Newton's iteration in (u, x), u = ln g.

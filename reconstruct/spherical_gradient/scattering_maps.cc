@@ -35,8 +35,10 @@ Result<void> check(const GradientPictures& p, const MapOptions& options) {
       !std::is_sorted(options.half_windows.begin(), options.half_windows.end()) ||
       options.half_windows.front() < 1 || options.half_windows.back() > 1000)
     return invalid_argument("half windows; expected 1 to 1000 pixels, in rising order");
-  if (!(options.certain > 0.0 && options.sigmas >= 0.0))
+  if (!(options.certain > 0.0 && options.sigmas >= 0.0 && options.normal_certain > 0.0))
     return invalid_argument("certainty and sigmas; expected > 0");
+  if (!(options.ratio_deviation >= 0.0 && options.reflectance_deviation >= 0.0))
+    return invalid_argument("deviations; expected at least 0");
   return ok();
 }
 
@@ -102,7 +104,8 @@ void measure_pixel(const GradientPictures& p,
                    std::size_t at,
                    PixelValues& values,
                    ScatteringMaps& maps) {
-  if (p.measured[at] == 0 || !(p.radiance[0][at] > 0.0F)) return;
+  if (p.measured[at] == kClipped) maps.left_out[at] = LeftOut::kSaturated;
+  if (p.measured[at] != kMeasured || !(p.radiance[0][at] > 0.0F)) return;
   const PixelRatio r = ratio_of(p, at);
   if (!(r.square > 0.0)) return;
   const double length = std::hypot(r.gradient[0], r.gradient[1], r.gradient[2]);
@@ -145,16 +148,32 @@ bool is_certain(const WindowValues& w, double flat, double certain) {
          w.ratio_variance < certain * certain * beyond * beyond;
 }
 
-/// The smallest window of every pixel that is certain enough, or the largest one.
+/// A pixel's normal as its window says, a unit vector.
+void put_normal(const WindowValues& w, std::size_t at, ScatteringMaps& maps) {
+  const double across = w.normal_x * w.normal_x + w.normal_y * w.normal_y;
+  if (!(across < 1.0)) return;
+  maps.normal_x[at] = static_cast<float>(w.normal_x);
+  maps.normal_y[at] = static_cast<float>(w.normal_y);
+  maps.normal_z[at] = static_cast<float>(std::sqrt(1.0 - across));
+}
+
+/// The smallest window of every pixel that is certain enough, or the largest one; normals by the first that is certain of them.
 std::vector<WindowValues> choose_windows(const PixelValues& values,
                                          const FlatRatios& flat,
                                          const MapOptions& options,
-                                         ThreadTeam& team) {
+                                         ThreadTeam& team,
+                                         ScatteringMaps& maps) {
   std::vector<WindowValues> chosen(values.measured.size());
   std::vector<std::uint8_t> done(values.measured.size(), 0);
+  std::vector<std::uint8_t> has_normal(values.measured.size(), 0);
   for (const int half : options.half_windows)
     for_each_window(values, half, team, [&](int x, int y, const WindowValues& window) {
       const std::size_t at = values.index(x, y);
+      if (has_normal[at] == 0 && window.count >= 6) {
+        put_normal(window, at, maps);
+        has_normal[at] =
+            window.normal_variance < options.normal_certain * options.normal_certain ? 1 : 0;
+      }
       if (done[at] != 0) return;
       chosen[at] = window;
       done[at] = is_certain(window, flat.at(window.reflectance), options.certain) ? 1 : 0;
@@ -163,10 +182,23 @@ std::vector<WindowValues> choose_windows(const PixelValues& values,
 }
 
 /// Variance of a ratio against the table's flat one.
-double ratio_variance(const WindowValues& w, const BallTable& table) {
+double ratio_variance(const WindowValues& w, const BallTable& table, const MapOptions& options) {
   const double of_table = table.ratio_deviation() * w.ratio;
-  return w.ratio_variance + of_table * of_table;
+  const double of_lamps = options.ratio_deviation * w.ratio;
+  return w.ratio_variance + of_table * of_table + of_lamps * of_lamps;
 }
+
+double reflectance_variance(const WindowValues& w, const MapOptions& options) {
+  const double shared = options.reflectance_deviation * w.reflectance;
+  return w.reflectance_variance + shared * shared;
+}
+
+/// Half of what the lowest and the highest index make of ln (g k l_d), which is ln D, and of ln g.
+struct IndexSpread {
+  LeftOut reason = LeftOut::kFound;
+  double log_diffusion = 0.0;
+  double log_decay = 0.0;
+};
 
 LeftOut judge(const WindowValues& w, double flat, double variance, double sigmas) {
   if (w.count < 6) return LeftOut::kNotMeasured;
@@ -190,15 +222,31 @@ LeftOut reason_of(BallTable::End end) {
   }
 }
 
+IndexSpread index_spread(const WindowValues& w, const MapOptions& options) {
+  if (options.lower_index == nullptr || options.higher_index == nullptr) return {};
+  const BallTable::Found low = options.lower_index->find(w.reflectance, w.ratio);
+  const BallTable::Found high = options.higher_index->find(w.reflectance, w.ratio);
+  for (const BallTable::Found& end : {low, high})
+    if (end.end != BallTable::End::kFound) return {reason_of(end.end)};
+  const double decay = 0.25 * std::log((1.0 - high.reduced_albedo) / (1.0 - low.reduced_albedo));
+  return {LeftOut::kFound, decay + 0.5 * std::log(high.curvature / low.curvature), decay};
+}
+
 void estimate_pixel(const WindowValues& w,
                     double pixel_mm,
                     const BallTable& table,
+                    const MapOptions& options,
                     std::size_t at,
                     BallTable::Found& found,
                     ScatteringMaps& maps) {
   found = table.find(w.reflectance, w.ratio, found);
   maps.left_out[at] = reason_of(found.end);
   if (found.end != BallTable::End::kFound) return;
+  const IndexSpread index = index_spread(w, options);
+  maps.left_out[at] = index.reason;
+  if (index.reason != LeftOut::kFound) return;
+  const double ratio_noise = ratio_variance(w, table, options);
+  const double reflectance_noise = reflectance_variance(w, options);
   const double curvature = w.curvature / pixel_mm;
   const double g = std::sqrt(3.0 * (1.0 - found.reduced_albedo));
   const double translucency = found.curvature / curvature;
@@ -206,12 +254,12 @@ void estimate_pixel(const WindowValues& w,
   const auto& s = found.sensitivity;
   const double by_reflectance = s[0] + s[2];
   const double by_ratio = s[1] + s[3];
-  const double log_variance = by_reflectance * by_reflectance * w.reflectance_variance +
-                              by_ratio * by_ratio * ratio_variance(w, table) +
-                              w.curvature_variance / (w.curvature * w.curvature) +
-                              kTableDeviation * kTableDeviation;
-  const double decay_variance =
-      s[0] * s[0] * w.reflectance_variance + s[1] * s[1] * ratio_variance(w, table);
+  const double log_variance =
+      by_reflectance * by_reflectance * reflectance_noise + by_ratio * by_ratio * ratio_noise +
+      w.curvature_variance / (w.curvature * w.curvature) + kTableDeviation * kTableDeviation +
+      index.log_diffusion * index.log_diffusion;
+  const double decay_variance = s[0] * s[0] * reflectance_noise + s[1] * s[1] * ratio_noise +
+                                index.log_decay * index.log_decay;
   maps.reduced_albedo[at] = static_cast<float>(found.reduced_albedo);
   maps.diffusion[at] = static_cast<float>(diffusion);
   maps.translucency[at] = static_cast<float>(translucency);
@@ -230,6 +278,8 @@ std::string_view to_string(LeftOut reason) {
       return "found";
     case LeftOut::kNotMeasured:
       return "not measured";
+    case LeftOut::kSaturated:
+      return "saturated";
     case LeftOut::kTooFlat:
       return "too flat";
     case LeftOut::kConcave:
@@ -258,17 +308,19 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
       measure_pixel(pictures, at, values, maps);
   });
   const FlatRatios flat(table);
-  const std::vector<WindowValues> windows = choose_windows(values, flat, options, team);
+  const std::vector<WindowValues> windows = choose_windows(values, flat, options, team, maps);
   team.run([&](int thread) {
     BallTable::Found last;
     for (std::size_t at = share(thread); at < share(thread + 1); ++at) {
       const WindowValues& window = windows[at];
       if (values.measured[at] == 0 || window.count < 6) continue;
       maps.curvature[at] = static_cast<float>(window.curvature / pictures.pixel_mm);
-      maps.left_out[at] =
-          judge(window, flat.at(window.reflectance), ratio_variance(window, table), options.sigmas);
+      maps.left_out[at] = judge(window,
+                                flat.at(window.reflectance),
+                                ratio_variance(window, table, options),
+                                options.sigmas);
       if (maps.left_out[at] == LeftOut::kFound)
-        estimate_pixel(window, pictures.pixel_mm, table, at, last, maps);
+        estimate_pixel(window, pictures.pixel_mm, table, options, at, last, maps);
     }
   });
   return maps;

@@ -11,6 +11,11 @@
 
 namespace opaline::reconstruct {
 
+/// What GradientPictures::measured says of a pixel.
+inline constexpr std::uint8_t kNotSeen = 0;  ///< outside the object, hot, blurred by its outline
+inline constexpr std::uint8_t kMeasured = 1;
+inline constexpr std::uint8_t kClipped = 2;  ///< saturated in some picture
+
 /// One channel of four cross-polarised pictures of an object among lights, seen along z by an orthographic camera: constant light, and the
 /// gradients (1 + omega_x)/2, (1 + omega_y)/2, (1 + omega_z)/2, omega the direction to the light. y points down the picture's rows.
 struct GradientPictures {
@@ -21,13 +26,14 @@ struct GradientPictures {
       1.0;  ///< what a surface that gives back all of the light shows under constant light
   std::array<std::vector<float>, 4> radiance;
   std::array<std::vector<float>, 4> variance;
-  std::vector<std::uint8_t> measured;  ///< 0: outside the object, saturated, shadowed
+  std::vector<std::uint8_t> measured;
 };
 
 /// Why a pixel has no answer.
 enum class LeftOut : std::uint8_t {
   kFound,           ///< it has one
   kNotMeasured,     ///< as the pictures say, or without light
+  kSaturated,       ///< in some picture
   kTooFlat,         ///< its curvature is not certainly above zero
   kConcave,         ///< its curvature is certainly below zero
   kBelowNoise,      ///< its ratio is not certainly above that of a flat surface
@@ -42,13 +48,23 @@ struct MapOptions {
   double certain =
       0.05;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
   double sigmas = 2.0;  ///< of what is called certain in LeftOut
+  double normal_certain =
+      0.004;  ///< standard deviation of a normal, radians, that needs no larger window
+  double ratio_deviation =
+      0.0;  ///< relative, of r, that all pixels share: how well the lamps are known
+  double reflectance_deviation = 0.0;  ///< the same of the reflectance: lamps, white, exit law
+  /// Tables of the lowest and the highest index that the object may have, which must outlive the call; none: the index is known. Half of what
+  /// they make of ln D and alpha' counts as a deviation, and a pixel that has an answer in one only is left out.
+  const BallTable* lower_index = nullptr;
+  const BallTable* higher_index = nullptr;
 };
 
 struct ScatteringMaps {
   int width = 0;
   int height = 0;
-  std::vector<float> normal_x, normal_y, normal_z;  ///< of each pixel, not smoothed
-  std::vector<float> curvature;                     ///< mean, 1/mm; > 0 where the object bulges
+  /// Of planes fitted in the smallest window that is certain enough (MapOptions::normal_certain); of each pixel by itself where none has six pixels.
+  std::vector<float> normal_x, normal_y, normal_z;
+  std::vector<float> curvature;  ///< mean, 1/mm; > 0 where the object bulges
   std::vector<float> reduced_albedo;
   std::vector<float> diffusion;           ///< D = 1/(3 sigma_t'), mm
   std::vector<float> translucency;        ///< l_d = 1/sigma_tr, mm

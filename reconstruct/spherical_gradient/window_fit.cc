@@ -62,7 +62,8 @@ void add_pixel(const PixelValues& p, int x, int y, int origin, double sign, Sums
       sign);
 }
 
-WindowValues fitted(const Sums& s) {
+/// At a pixel, rows counted as in the sums.
+WindowValues fitted(const Sums& s, double at_x, double at_y) {
   WindowValues w;
   w.count = static_cast<int>(std::lround(s[kCount]));
   if (w.count < 6) return w;
@@ -82,7 +83,13 @@ WindowValues fitted(const Sums& s) {
   const double ny_x = s[kNyX] - x * s[kNy];
   const double ny_y = s[kNyY] - y * s[kNy];
   w.curvature = 0.5 * (yy * nx_x - xy * nx_y + xx * ny_y - xy * ny_x) / det;
-  w.curvature_variance = 0.25 * s[kNormalVariance] / n * (xx + yy) / det;
+  const double noise = s[kNormalVariance] / n;  // of one pixel
+  w.curvature_variance = 0.25 * noise * (xx + yy) / det;
+  const double dx = at_x - x;
+  const double dy = at_y - y;
+  w.normal_x = s[kNx] / n + ((yy * nx_x - xy * nx_y) * dx + (xx * nx_y - xy * nx_x) * dy) / det;
+  w.normal_y = s[kNy] / n + ((yy * ny_x - xy * ny_y) * dx + (xx * ny_y - xy * ny_x) * dy) / det;
+  w.normal_variance = noise * (1.0 / n + (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det);
   w.ratio = s[kRatio] / n;
   w.ratio_variance = s[kRatioVariance] / (n * n);
   w.reflectance = s[kReflectance] / n;
@@ -125,7 +132,7 @@ void for_each_window(const PixelValues& p,
       for (int x = 0; x < p.width; ++x) {
         if (x + half < p.width) add(window, columns[x + half], 1.0);
         if (x - half - 1 >= 0) add(window, columns[x - half - 1], -1.0);
-        if (p.measured[p.index(x, y)] != 0) f(x, y, fitted(window));
+        if (p.measured[p.index(x, y)] != 0) f(x, y, fitted(window, x, y - begin));
       }
     }
   });

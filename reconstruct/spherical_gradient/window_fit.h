@@ -35,6 +35,9 @@ struct WindowValues {
   int count = 0;           ///< measured pixels; nothing else is set below six of them
   double curvature = 0.0;  ///< H, 1/pixel
   double curvature_variance = 0.0;
+  double normal_x = 0.0;  ///< of those planes at the pixel itself
+  double normal_y = 0.0;
+  double normal_variance = 0.0;  ///< of one component
   double ratio = 0.0;
   double ratio_variance = 0.0;
   double reflectance = 0.0;

@@ -87,5 +87,21 @@ TEST(BallTable, RefusesTooFewBalls) {
   EXPECT_FALSE(BallTable::make({}));
 }
 
+// Traced at an index between those of the tables. The tolerances: the fit's 0.3 % (as at the traced indices) and four deviations of the ball's own noise.
+TEST(BallTable, HoldsForIndicesBetweenThoseThatWereTraced) {
+  ThreadTeam team(2);
+  const double decay = std::sqrt(3.0 * 0.05);
+  const sim::BallLight traced =
+      *sim::trace_ball({0.95, 1.0 / (decay * 0.2), 1.35}, 200'000, 77, team);
+  const BallTable::Light light = BallTable::of_index(1.35)->light(0.95, 0.2);
+  EXPECT_NEAR(light.reflectance,
+              traced.reflectance,
+              0.003 * traced.reflectance + 4.0 * traced.reflectance_deviation);
+  EXPECT_NEAR(light.ratio, traced.ratio, 0.003 * traced.ratio + 4.0 * traced.ratio_deviation);
+  const BallTable::Light standard = BallTable::standard().light(0.95, 0.2);
+  EXPECT_NEAR(BallTable::of_index(1.4)->light(0.95, 0.2).ratio, standard.ratio, 1e-9);
+  EXPECT_FALSE(BallTable::of_index(1.6));
+}
+
 }  // namespace
 }  // namespace opaline::reconstruct
