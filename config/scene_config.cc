@@ -162,7 +162,7 @@ void visit_pattern(Fields& fields, PatternOptions& p) {
   fields.one_of(
       {"kind", "of a second set of coefficients within the first"}, p.kind, kPatternKinds);
   if (p.kind == PatternOptions::Kind::kNone) return;
-  fields.length_mm({"size", "of one period"}, p.size_mm);
+  fields.length_mm({"size", "of one period"}, p.size_mm, Range::between(1e-6, 1e6));
   visit_coefficients(fields, p.absorption, p.reduced_scattering);
   fields.check(std::ranges::min(p.absorption) > 0.0,
                "absorption",

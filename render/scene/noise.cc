@@ -7,7 +7,7 @@
 namespace opaline::render {
 namespace {
 
-std::uint32_t hash(int x, int y, int z) {
+std::uint32_t hash(std::int64_t x, std::int64_t y, std::int64_t z) {
   auto h = static_cast<std::uint32_t>(x) * 0x8da6b343U ^
            static_cast<std::uint32_t>(y) * 0xd8163841U ^
            static_cast<std::uint32_t>(z) * 0xcb1ab31fU;
@@ -16,7 +16,7 @@ std::uint32_t hash(int x, int y, int z) {
   return h ^ h >> 15;
 }
 
-double gradient(int x, int y, int z, Vec3 from) {
+double gradient(std::int64_t x, std::int64_t y, std::int64_t z, Vec3 from) {
   static constexpr std::array<Vec3, 12> kGradients{{{1, 1, 0},
                                                     {-1, 1, 0},
                                                     {1, -1, 0},
@@ -39,10 +39,11 @@ double mix(double a, double b, double t) { return a + t * (b - a); }
 }  // namespace
 
 double gradient_noise(Vec3 place) {
-  const int x = static_cast<int>(std::floor(place.x));
-  const int y = static_cast<int>(std::floor(place.y));
-  const int z = static_cast<int>(std::floor(place.z));
-  const Vec3 f{place.x - x, place.y - y, place.z - z};
+  const auto x = static_cast<std::int64_t>(std::floor(place.x));
+  const auto y = static_cast<std::int64_t>(std::floor(place.y));
+  const auto z = static_cast<std::int64_t>(std::floor(place.z));
+  const Vec3 f{
+      place.x - std::floor(place.x), place.y - std::floor(place.y), place.z - std::floor(place.z)};
   std::array<double, 8> corners{};
   for (int k = 0; k < 8; ++k) {
     const int i = k & 1;

@@ -48,7 +48,8 @@ Result<void> check_translucent(const TranslucentOptions& material) {
   if (material.pattern.kind != PatternOptions::Kind::kNone) {
     const PatternOptions& pattern = material.pattern;
     if (!named) return invalid_argument("pattern: expected either a file or a pattern");
-    if (!(pattern.size_mm > 0.0)) return invalid_argument("pattern.size: expected more than 0 mm");
+    if (!(pattern.size_mm >= 1e-6))
+      return invalid_argument("pattern.size: expected 1e-6 mm or more");
     for (const auto& [first, second, what] :
          {std::tuple{material.absorption, pattern.absorption, "absorption"},
           std::tuple{

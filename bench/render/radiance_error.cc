@@ -1,0 +1,94 @@
+#include "bench/render/radiance_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "base/ensure.h"
+#include "base/log.h"
+#include "bench/render/render_case.h"
+#include "reconstruct/diffusion/fresnel.h"
+#include "render/trace/triangle_tree.h"
+#include "render/trace/vertex_values.h"
+
+namespace opaline::bench {
+namespace {
+
+using render::RayHit;
+using render::TriangleMesh;
+using render::TriangleTree;
+
+constexpr double kIor = 1.3;
+constexpr Vec3 kTowards{0.6, 0.48, 0.64};
+using Colour = std::array<double, 3>;
+
+Colour radiance(const render::SurfaceLight& light, std::size_t v) {
+  Colour colour{};
+  for (int c = 0; c < 3; ++c) colour[c] = light.fluence[v][c] + 3.0 * light.net_flux[v][c];
+  return colour;
+}
+
+std::optional<RayHit> nearest_along(const TriangleTree& tree,
+                                    Vec3 place,
+                                    Vec3 normal,
+                                    double reach) {
+  const auto in = tree.nearest({place + normal * reach, normal * -1.0});
+  if (in && in->distance < 2.0 * reach) return in;
+  return std::nullopt;
+}
+
+std::vector<double> vertex_areas(const TriangleMesh& mesh) {
+  std::vector<double> areas(mesh.vertices.size());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = mesh.vertices[t[0]];
+    const double area = 0.5 * length(cross(mesh.vertices[t[1]] - a, mesh.vertices[t[2]] - a));
+    for (const int v : t) areas[v] += area / 3.0;
+  }
+  return areas;
+}
+
+}  // namespace
+
+LitMarble::LitMarble(const render::SignedDistance& solid,
+                     const render::DiffusionOptions& options,
+                     ThreadTeam& team) {
+  auto body = render::Subsurface::create(solid, marbled_optics, kIor, options, team, {});
+  ENSURE(body.has_value());
+  body_ = *std::move(body);
+  std::vector<std::array<float, 3>> q;
+  for (const render::SurfacePlace& place : body_->places()) {
+    q.emplace_back().fill(static_cast<float>(std::max(0.0, dot(place.normal, kTowards))));
+  }
+  const auto solved = body_->light(q, {});
+  if (!solved) log::error("{}", solved.error().message);
+  ENSURE(solved.has_value());
+}
+
+double LitMarble::error_against(const LitMarble& reference) const {
+  const TriangleMesh& mesh = body_->surface();
+  const TriangleMesh& other = reference.body_->surface();
+  const auto tree = TriangleTree::create(other);
+  ENSURE(tree.has_value());
+  const auto normals = render::vertex_normals(mesh);
+  const auto areas = vertex_areas(mesh);
+  const double reach = body_->report().spacing_mm;
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const auto hit = nearest_along(*tree, mesh.vertices[v], normals[v], reach);
+    if (!hit) continue;
+    Colour truth{};
+    for (int k = 0; k < 3; ++k) {
+      const Colour corner = radiance(reference.body_->lit(), other.triangles[hit->triangle][k]);
+      for (int c = 0; c < 3; ++c) truth[c] += hit->weights[k] * corner[c];
+    }
+    const Colour own = radiance(body_->lit(), v);
+    for (int c = 0; c < 3; ++c) {
+      error += areas[v] * (own[c] - truth[c]) * (own[c] - truth[c]);
+      size += areas[v] * truth[c] * truth[c];
+    }
+  }
+  return std::sqrt(error / size);
+}
+
+}  // namespace opaline::bench

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "base/thread_team.h"
+#include "render/graph/optics.h"
+#include "render/mesh/signed_distance.h"
+#include "render/scene/subsurface.h"
+
+namespace opaline::bench {
+
+/// A marbled solid (marbled_optics) under a directional light, solved to 1e-8: what its surface sends along its normal,
+///
+///   L = F_t / (4 pi eta^2) (phi + 3 J_n),   red, green, blue
+class LitMarble {
+ public:
+  LitMarble(const render::SignedDistance& solid,
+            const render::DiffusionOptions& options,
+            ThreadTeam& team);
+
+  /// Relative RMS, over its surface and all channels, of its radiance against another's, which is interpolated linearly in
+  /// the triangle that lies nearest along the normal.
+  double error_against(const LitMarble& reference) const;
+  std::size_t tetrahedra() const { return body_->report().tetrahedra; }
+
+ private:
+  std::unique_ptr<render::Subsurface> body_;
+};
+
+}  // namespace opaline::bench
