@@ -23,6 +23,15 @@ constexpr std::array kNames{
     FaultName{FaultKind::kPatternStuck, "pattern_stuck", "the projector keeps the old pattern"},
     FaultName{FaultKind::kSlowProjector, "slow_projector", "the light follows a second late"},
     FaultName{FaultKind::kLampStuck, "lamp_stuck", "the lamp stays on when told to go dark"},
+    FaultName{FaultKind::kGammaOn, "gamma_on", "the projector applies a gamma of 2.2 to the codes"},
+    FaultName{FaultKind::kBlackDrift, "black_drift", "all codes are 24 too high"},
+    FaultName{FaultKind::kSwappedChannels, "swapped_channels", "red and blue are swapped"},
+    FaultName{FaultKind::kFlicker, "flicker", "the lamp is 3 % off in this exposure"},
+    FaultName{
+        FaultKind::kWheelBeat, "wheel_beat", "the colour wheel turns a tenth faster than said"},
+    FaultName{FaultKind::kUnreportedExposure,
+              "unreported_exposure",
+              "1 s and more last a tenth longer, unsaid"},
 };
 
 }  // namespace

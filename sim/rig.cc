@@ -17,6 +17,11 @@ constexpr std::size_t kRenderedKept = 16;
 /// An exposure whose caller has gone away may still be on its way out when the next one is asked for.
 constexpr std::chrono::milliseconds kExposureEnds{500};
 constexpr nanoseconds kSlowLight = std::chrono::seconds(1);
+constexpr nanoseconds kLong = std::chrono::seconds(1);
+constexpr double kUnwantedGamma = 2.2;
+constexpr double kFlickers = 0.03;
+constexpr double kFastTurn = 0.9;
+constexpr std::uint16_t kDriftedCodes = 24;
 
 double seconds(nanoseconds duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -32,12 +37,27 @@ std::uint64_t content_hash(const Image<std::uint8_t>& codes) {
   return hash;
 }
 
-/// For how long each channel is lit at full power.
-Rgb lit_seconds(const ProjectorOptics& projector, double phase, const LightStretch& stretch) {
+/// For how long each channel is lit at full power by a wheel of which a turn takes `turn` seconds.
+Rgb lit_seconds(const ProjectorOptics& projector,
+                double turn,
+                double phase,
+                const LightStretch& stretch) {
   const double all = stretch.to_seconds - stretch.from_seconds;
   if (!projector.color_wheel) return {all, all, all};
-  return wheel_lit_seconds(
-      seconds(projector.wheel_turn), phase + stretch.from_seconds, phase + stretch.to_seconds);
+  return wheel_lit_seconds(turn, phase + stretch.from_seconds, phase + stretch.to_seconds);
+}
+
+Image<std::uint8_t> with_gamma(Image<std::uint8_t> codes) {
+  for (std::uint8_t& code : codes.samples()) {
+    code = static_cast<std::uint8_t>(
+        std::lround(255.0 * std::pow(static_cast<double>(code) / 255.0, kUnwantedGamma)));
+  }
+  return codes;
+}
+
+void swap_red_and_blue(Image<std::uint16_t>& pixels) {
+  const std::span<std::uint16_t> s = pixels.samples();
+  for (std::size_t i = 0; i + 2 < s.size(); i += 3) std::swap(s[i], s[i + 2]);
 }
 
 /// Responses hold for one place of the camera; within a hundredth of its distance the picture is the same.
@@ -72,11 +92,21 @@ struct Rig::Exposure {
   std::uint64_t session = 0;
   nanoseconds start{};
   nanoseconds requested{};
-  nanoseconds measured{};
-  std::uint64_t key = 0;  ///< of all its randomness
+  nanoseconds measured{};  ///< as the frame says
+  nanoseconds open{};      ///< as it was
+  std::uint64_t key = 0;   ///< of all its randomness
   int camera_lost = 0;
   bool missing = false;
   std::stop_token session_end = {};
+};
+
+/// The light of an exposure, and what is wrong with how it is read.
+struct Rig::Picture {
+  std::vector<LightStretch> lights;
+  double brightness = 1.0;
+  double turn = 1.0;  ///< of the wheel, over what it says
+  std::uint16_t drift = 0;
+  bool swapped = false;
 };
 
 Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
@@ -215,7 +245,12 @@ Result<void> Rig::show(std::uint64_t session,
     const std::lock_guard lock(mutex_);
     return darkened_;
   }();
-  Shown shown = render(pattern);
+  const bool gamma = [&] {
+    const std::lock_guard lock(mutex_);
+    return plan_.strikes(FaultKind::kGammaOn, pattern.id);
+  }();
+  Shown shown = render(gamma ? drivers::Pattern{pattern.id, with_gamma(pattern.codes), pattern.name}
+                             : pattern);
   const std::lock_guard lock(mutex_);
   if (session == 0 || session != projector_session_)
     return unavailable("simulated projector: not open");
@@ -261,6 +296,8 @@ Result<Rig::Exposure> Rig::trigger(std::uint64_t session,
   const double third = plan_.strikes(FaultKind::kWrongExposure, id) ? 4.0 / 3.0 : 1.0;
   e.measured = nanoseconds(std::llround(static_cast<double>(requested.count()) * third *
                                         (1.0 + camera.exposure_error * z)));
+  const bool longer = requested >= kLong && plan_.strikes(FaultKind::kUnreportedExposure, id);
+  e.open = longer ? e.measured * 11 / 10 : e.measured;
   e.camera_lost = plan_.strikes_for_good(FaultKind::kCameraLost, id);
   e.missing = plan_.strikes(FaultKind::kMissingFrame, id);
   e.session_end = camera_session_end_.get_token();
@@ -278,7 +315,7 @@ Result<Frame> Rig::expose(std::uint64_t session, nanoseconds exposure, std::stop
   Result<Frame> frame = [&]() -> Result<Frame> {
     if (triggered->camera_lost > 0 || triggered->missing)
       return fail_later(*triggered, over.get_token());
-    if (!clock_.sleep(triggered->measured, over.get_token())) return cancelled("exposure: stopped");
+    if (!clock_.sleep(triggered->open, over.get_token())) return cancelled("exposure: stopped");
     return finish(*triggered);
   }();
   if (!frame && frame.error().code == ErrorCode::kCancelled && !stop.stop_requested()) {
@@ -309,19 +346,15 @@ Result<Frame> Rig::finish(const Exposure& exposure) {
   {
     const std::lock_guard lock(mutex_);
     if (camera_session_ != exposure.session) return cancelled("exposure: camera closed");
-    lights = timeline_.during(exposure.start, exposure.measured);
+    lights = timeline_.during(exposure.start, exposure.open);
     const Shown shown = lights.front().shown;
     if (plan_.strikes(FaultKind::kStaleFrame, shown ? shown->id : 0)) {
-      lights = {{timeline_.before(exposure.start), 0.0, seconds(exposure.measured)}};
+      lights = {{timeline_.before(exposure.start), 0.0, seconds(exposure.open)}};
     }
   }
   Frame frame;
   frame.pattern_id = lights.size() == 1 && lights[0].shown ? lights[0].shown->id : 0;
-  {
-    const std::lock_guard lock(mutex_);
-    if (plan_.strikes(FaultKind::kBlackFrame, frame.pattern_id)) lights = {};
-  }
-  frame.pixels = picture(exposure, lights);
+  frame.pixels = picture(exposure, disturbed(std::move(lights), frame.pattern_id));
   frame.sha256 = frame_hash(frame.pixels);
   frame.bit_depth = options_.camera.bit_depth;
   frame.start = exposure.start;
@@ -330,22 +363,38 @@ Result<Frame> Rig::finish(const Exposure& exposure) {
   return frame;
 }
 
-Image<std::uint16_t> Rig::picture(const Exposure& exposure,
-                                  const std::vector<LightStretch>& lights) const {
-  const double turn = seconds(options_.projector.wheel_turn);
+Rig::Picture Rig::disturbed(std::vector<LightStretch> lights, std::uint64_t id) {
+  const std::lock_guard lock(mutex_);
+  Picture picture{std::move(lights)};
+  if (plan_.strikes(FaultKind::kBlackFrame, id)) picture.lights = {};
+  if (plan_.strikes(FaultKind::kFlicker, id))
+    picture.brightness += exposures_ % 2 == 0 ? kFlickers : -kFlickers;
+  if (plan_.strikes(FaultKind::kWheelBeat, id)) picture.turn = kFastTurn;
+  if (plan_.strikes(FaultKind::kBlackDrift, id)) picture.drift = kDriftedCodes;
+  picture.swapped = plan_.strikes(FaultKind::kSwappedChannels, id);
+  return picture;
+}
+
+Image<std::uint16_t> Rig::picture(const Exposure& exposure, const Picture& picture) const {
+  const double turn = picture.turn * seconds(options_.projector.wheel_turn);
   const double phase = turn * uniform(mix(exposure.key, 0x7768656c));
   Image<float> sum(options_.camera.model.width, options_.camera.model.height, 3);
-  for (const LightStretch& stretch : lights) {
+  for (const LightStretch& stretch : picture.lights) {
     if (!stretch.shown) continue;
-    Rgb lit = lit_seconds(options_.projector, phase, stretch);
+    Rgb lit = lit_seconds(options_.projector, turn, phase, stretch);
     const double hours = seconds(exposure.start) / 3600.0;
     for (double& channel : lit) channel *= 1.0 + options_.projector.drift_per_hour * hours;
     const std::span<const float> radiance = stretch.shown->light->sensor_radiance.samples();
     for (std::size_t i = 0; i < radiance.size(); ++i) {
-      sum.samples()[i] += static_cast<float>(lit[i % 3]) * radiance[i];
+      sum.samples()[i] += static_cast<float>(picture.brightness * lit[i % 3]) * radiance[i];
     }
   }
-  return sensor_.read(sum, seconds(exposure.measured), exposure.key);
+  Image<std::uint16_t> codes = sensor_.read(sum, seconds(exposure.open), exposure.key);
+  const double most = options_.camera.max_code();
+  for (std::uint16_t& code : codes.samples())
+    code = static_cast<std::uint16_t>(std::min(most, 1.0 * code + picture.drift));
+  if (picture.swapped) swap_red_and_blue(codes);
+  return codes;
 }
 
 /// Numbers the frame, and damages it on the way out where a fault says so.

@@ -70,8 +70,9 @@ class Rig : public RigPort {
                            const std::stop_token& stop);
   Result<Frame> finish(const Exposure& exposure);
   Result<Frame> fail_later(const Exposure& exposure, std::stop_token stop);
-  Image<std::uint16_t> picture(const Exposure& exposure,
-                               const std::vector<LightStretch>& lights) const;
+  struct Picture;
+  Image<std::uint16_t> picture(const Exposure& exposure, const Picture& picture) const;
+  Picture disturbed(std::vector<LightStretch> lights, std::uint64_t id);
   Result<void> deliver(const Exposure& exposure, Frame& frame);
   void end_camera_session(std::uint64_t next);
   Shown render(const drivers::Pattern& pattern);
