@@ -17,9 +17,11 @@ constexpr std::size_t kMostPixels = 6000;
 constexpr int kFewestPixels = 50;
 constexpr double kLowest = 0.01;
 constexpr double kHighest = 0.98;
+constexpr double kToe = 1.5;          // times the lowest code that tells
 constexpr double kTelling = 1.9;      // times as long: a growth that noise does not hide
 constexpr double kGrowth = 1.05;      // of the code, at least, where the time doubles
 constexpr double kSmoothness = 30.0;  // lambda, per pixel's worth of weight
+constexpr double kBelieved = 1e-5;    // of the times, against all samples together
 constexpr int kRounds = 6;
 
 struct Sample {
@@ -52,6 +54,10 @@ double between(const Eigen::VectorXd& unknowns, double fraction) {
   return (1.0 - p.share) * unknowns[p.knot] + p.share * unknowns[p.knot + 1];
 }
 
+double lowest_of(CodeRange range) {
+  return std::max(kLowest, range.floor / (range.clipping - range.black));
+}
+
 // From the first sample to the first one at least twice as long: closer ones differ by less than noise and rounding may take away.
 bool stuck(const std::vector<Sample>& samples, std::span<const Exposure> stack) {
   std::size_t from = 0;
@@ -70,11 +76,12 @@ std::vector<Sample> samples_of(std::span<const Exposure> stack,
                                int channel,
                                std::size_t pixel) {
   std::vector<Sample> samples;
+  const double lowest = lowest_of(range);
   for (std::size_t j = 0; j < stack.size(); ++j) {
     const Image<std::uint16_t>& frame = *stack[j].frame;
     const double code = frame.samples()[pixel * frame.channels() + channel];
     const double f = (code - range.black) / (range.clipping - range.black);
-    if (f <= kLowest || f >= kHighest) continue;
+    if (f <= lowest || f >= kHighest) continue;
     samples.push_back({j, f, f * (1.0 - f), std::log(stack[j].seconds) - std::log(f)});
   }
   return samples;
@@ -110,6 +117,7 @@ class NormalEquations {
         matrix_(Eigen::MatrixXd::Zero(size_, size_)),
         right_(Eigen::VectorXd::Zero(size_)) {
     for (const Exposure& exposure : stack) log_times_.push_back(std::log(exposure.seconds));
+    told_.resize(log_times_.size());
   }
 
   // The light of the pixel is eliminated: what remains are differences from the pixel's weighted mean.
@@ -127,6 +135,7 @@ class NormalEquations {
     for (const Sample& s : pixel.samples) {
       const double weight = pixel.trust * s.weight;
       weight_ += weight;
+      told_[s.exposure] += weight;
       for_each_entry(s, [&](int i, double a) {
         for_each_entry(s, [&](int j, double b) { matrix_(i, j) += weight * a * b; });
         right_[i] += weight * a * (s.target - mean_target);
@@ -170,7 +179,8 @@ class NormalEquations {
     for (int k = 1; k + 1 < kKnots; ++k) {
       const double f = static_cast<double>(k) / (kKnots - 1);
       Eigen::VectorXd row = Eigen::VectorXd::Zero(size_);
-      row[k - 1] = row[k + 1] = 1.0;
+      row[k - 1] = 1.0 - 0.5 / k;
+      row[k + 1] = 1.0 + 0.5 / k;
       row[k] = -2.0;
       add_row(row, kSmoothness * weight_ / kKnots * f * std::max(f * (1.0 - f), 0.02));
     }
@@ -184,20 +194,26 @@ class NormalEquations {
     Eigen::VectorXd constant = Eigen::VectorXd::Zero(size_);
     Eigen::VectorXd power = Eigen::VectorXd::Zero(size_);
     double mean = 0.0;
-    for (const double t : log_times_) mean += t / static_cast<double>(log_times_.size());
+    for (std::size_t j = 0; j < log_times_.size(); ++j) mean += log_times_[j] * told_[j] / weight_;
     for (std::size_t j = 0; j < log_times_.size(); ++j) {
-      constant[kKnots + static_cast<int>(j)] = 1.0;
-      power[kKnots + static_cast<int>(j)] = log_times_[j] - mean;
+      const int d = kKnots + static_cast<int>(j);
+      const double share =
+          told_[j] /
+          weight_;  // one that few samples tell of could have any error that suits the others
+      constant[d] = share;
+      power[d] = share * (log_times_[j] - mean);
+      matrix_(d, d) += kBelieved * weight_;
     }
     add_row(constant, weight_);
     add_row(power, weight_);
-    matrix_.diagonal().array() += 1e-9 * weight_;  // a time that no pixel tells of is believed
+    matrix_.diagonal().array() += 1e-9 * weight_;
   }
 
   int size_;
   Eigen::MatrixXd matrix_;
   Eigen::VectorXd right_;
   std::vector<double> log_times_;
+  std::vector<double> told_;  // the samples' weight, by exposure
   double weight_ = 0.0;
 };
 
@@ -263,11 +279,18 @@ void pool_falling(std::vector<double>& values) {
   }
 }
 
-capture::ResponseCurve curve_of(const Eigen::VectorXd& unknowns) {
-  std::vector<double> table;
-  for (int i = 0; i < kTable; ++i) {
+// Where no sample tells: the power of f that the curve goes with just above.
+double toe(const Eigen::VectorXd& unknowns, double from, double f) {
+  const double at = between(unknowns, from);
+  const double power = (between(unknowns, kToe * from) - at) / std::log(kToe);
+  return f * std::exp(at + power * std::log(f / from));
+}
+
+capture::ResponseCurve curve_of(const Eigen::VectorXd& unknowns, double lowest) {
+  std::vector<double> table{0.0};
+  for (int i = 1; i < kTable; ++i) {
     const double f = static_cast<double>(i) / (kTable - 1);
-    table.push_back(f * std::exp(between(unknowns, f)));
+    table.push_back(f < lowest ? toe(unknowns, lowest, f) : f * std::exp(between(unknowns, f)));
   }
   pool_falling(table);
   const double full = table.back();
@@ -307,7 +330,7 @@ Result<void> check(std::span<const Exposure> stack, CodeRange range, int channel
   return ok();
 }
 
-Result<void> check_told(const Pixels& pixels) {
+Result<void> check_told(const Pixels& pixels, CodeRange range) {
   if (static_cast<int>(pixels.telling.size()) < kFewestPixels)
     return invalid_argument(
         fmt::format("only {} pixels tell of the response, {} are stuck: of each pixel two "
@@ -328,7 +351,7 @@ Result<void> check_told(const Pixels& pixels) {
       highest = std::max(highest, s.fraction);
     }
   }
-  if (lowest > 0.05 || highest < 0.95)
+  if (lowest > std::max(0.05, 1.25 * lowest_of(range)) || highest < 0.95)
     return invalid_argument(
         fmt::format("the stack tells of {:.0f} to {:.0f} % of the code range; 5 to 95 % are "
                     "needed: add longer and shorter exposures",
@@ -342,9 +365,9 @@ Result<void> check_told(const Pixels& pixels) {
 Result<ResponseFit> fit_response(std::span<const Exposure> stack, CodeRange range, int channel) {
   if (auto checked = check(stack, range, channel); !checked) return checked.error();
   Pixels pixels = collect(stack, range, channel);
-  if (auto told = check_told(pixels); !told) return told.error();
+  if (auto told = check_told(pixels, range); !told) return told.error();
   const Eigen::VectorXd unknowns = fit(pixels.telling, stack);
-  ResponseFit result{curve_of(unknowns), {}, 0.0, 0, pixels.refused};
+  ResponseFit result{curve_of(unknowns, lowest_of(range)), {}, 0.0, 0, pixels.refused};
   for (std::size_t j = 0; j < stack.size(); ++j) {
     result.seconds.push_back(stack[j].seconds * std::exp(unknowns[kKnots + static_cast<int>(j)]));
   }

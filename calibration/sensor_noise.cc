@@ -19,6 +19,7 @@ constexpr double kOutlying = 5.0;     // standard deviations
 constexpr double kHot = 8.0;          // standard deviations
 constexpr double kMadToSigma = 1.4826;
 constexpr double kQuantisation = 1.0 / 12.0;
+constexpr double kSlopeOver = 1.0 / 64;
 constexpr double kResolved = 0.45;  // codes: half a code, less what it may be measured too low by
 
 double median_of(std::vector<double> values) {
@@ -79,6 +80,18 @@ Level level_of(const Bin& bin) {
   }
   level.mean /= level.count;
   level.variance = 0.5 * (squares - sum * sum / level.count) / (level.count - 1.0) - kQuantisation;
+  return level;
+}
+
+Level through(const capture::ResponseCurve& response, CodeRange range, Level level) {
+  if (response.kind == capture::ResponseCurve::Kind::kLinear) return level;
+  const double width = range.clipping - range.black;
+  const double f = level.mean / width;
+  const double low = std::max(0.0, f - kSlopeOver);
+  const double high = std::min(1.0, f + kSlopeOver);
+  const double slope = (signal_at(response, high) - signal_at(response, low)) / (high - low);
+  level.mean = width * signal_at(response, f);
+  level.variance *= slope * slope;
   return level;
 }
 
@@ -161,7 +174,8 @@ void mark_hot(DarkFrame& dark) {
 
 Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
                                        CodeRange range,
-                                       int channel) {
+                                       int channel,
+                                       const capture::ResponseCurve& response) {
   for (const FramePair& pair : pairs) {
     if (!same_shape(*pair.first, *pair.second))
       return invalid_argument("the frames of a pair differ in size");
@@ -176,7 +190,7 @@ Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
   for (const FramePair& pair : pairs)
     for (const Bin& bin : sorted_by_light(pair, range, channel)) {
       if (bin.means.size() < kFewest) continue;
-      levels.push_back(level_of(bin));
+      levels.push_back(through(response, range, level_of(bin)));
       brightest = std::max(brightest, levels.back().mean);
     }
   if (levels.size() < 3 || brightest < 0.2 * (range.clipping - range.black))

@@ -32,11 +32,13 @@ struct PhotonTransfer {
 ///
 /// fitted over 32 bins of m of each pair, each weighing by n / (2 v^2), up to 85 % of the code range. The difference is free of fixed patterns, and as
 /// sum and difference of two Poisson counts are uncorrelated, sorting pixels by the sum selects nothing. Of each bin the
-/// differences beyond five standard deviations (from the median) are left out.
+/// differences beyond five standard deviations (from the median) are left out. Through a response s(f) of the fraction f of
+/// the code range, m is the range times s, and (v - 1/12) is multiplied by (ds/df)^2, the slope over a 32nd of the range.
 /// Errors: kInvalidArgument for shapes, and when the pairs span too little light or noise does not grow with it.
 Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
                                        CodeRange range,
-                                       int channel);
+                                       int channel,
+                                       const capture::ResponseCurve& response = {});
 
 /// A sensor in the dark.
 struct DarkFrame {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -74,6 +75,23 @@ double rms_error(const capture::ResponseCurve& curve, double gamma) {
 
 // The goal set for the station: 1 % of full scale over 5 to 95 % of the range.
 constexpr double kGoal = 0.01;
+
+// Exposures that only noise and stray samples tell of must not take up the freedom that response and times share.
+TEST(ResponseFit, IsNotMisledByExposuresThatNextToNothingTellsOf) {
+  std::vector<double> seconds = kSeconds;
+  for (const double t : {1e-5, 3e-5, 20.0, 60.0, 180.0}) seconds.push_back(t);
+  std::ranges::sort(seconds);
+  const sim::CameraOptics o = optics(12, 2.2);
+  Stack stack(o, seconds);
+  stack.seconds = seconds;
+  stack.range.floor = 0.12 * (o.max_code() - o.black_level);
+  const auto fit = stack.fit();
+  ASSERT_TRUE(fit) << fit.error().message;
+  for (int i = 15; i <= 95; i += 10) {
+    const double f = 0.01 * i;
+    EXPECT_NEAR(signal_at(fit->curve, f), std::pow(f, 2.2), 0.01) << f;  // the goal of the issue
+  }
+}
 
 TEST(ResponseFit, TakesExposuresThatLieClose) {
   std::vector<double> seconds;

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/calibration.h"
+
+namespace opaline::calibration {
+
+/// The steps in the order that they must be done: each believes what those before it found.
+inline constexpr std::array<std::string_view, 5> kSteps{
+    "warm_up", "black_level", "linearity", "radiometric", "check"};
+/// Place of a step in kSteps. Errors: kInvalidArgument listing them.
+Result<std::size_t> step_index(std::string_view name);
+
+/// One figure that a step must keep to be accepted: value <= limit.
+struct Gate {
+  std::string name;  ///< "swapped channels": what is wrong when it fails
+  double value = 0.0;
+  double limit = 0.0;
+  std::string unit;
+  std::string remedy;  ///< what to do when it fails
+
+  bool passed() const { return value <= limit; }  // false for NaN
+};
+
+/// What a step did.
+struct StepRecord {
+  std::string step;
+  std::string finished;  ///< UTC
+  std::vector<Gate> gates;
+  nlohmann::json values = nlohmann::json::object();  ///< figures for people and for comparing
+
+  bool accepted() const;
+};
+
+/// A camera or projector, so that a calibration is not used with another.
+struct DeviceIdentity {
+  std::string model;
+  std::string serial;
+  int width = 0;
+  int height = 0;
+  int bit_depth = 0;  ///< of a camera
+  bool operator==(const DeviceIdentity&) const = default;
+};
+
+/// What the steps have measured so far; a step sets what it finds.
+struct Measured {
+  std::optional<double> black_level;  ///< code without light
+  std::array<double, 3> black_of_channels{};
+  double dark_codes_per_second = 0.0;
+  std::vector<std::pair<int, int>> hot_pixels;  ///< (x, y)
+  std::optional<double> clipping_code;
+  std::optional<capture::ResponseCurve> response;
+  std::optional<double> projector_gamma;
+  std::optional<double> gain_electrons_per_code;
+  std::optional<double> read_noise_electrons;
+};
+
+enum class RecordState : std::uint8_t { kIncomplete, kRefused, kAccepted };
+std::string_view to_string(RecordState state);
+
+/// One calibration of a station: what was measured, by which steps, and whether it may be used. Never changed once it is
+/// accepted.
+struct Record {
+  static constexpr int kFormat = 1;
+
+  int version = 0;  ///< 1, 2, ... of the station
+  std::string station;
+  std::string created;  ///< UTC
+  std::string program;  ///< what made it
+  DeviceIdentity camera;
+  DeviceIdentity projector;
+  std::vector<StepRecord> steps;  ///< in order; the first ones of kSteps
+  Measured measured;
+
+  const StepRecord* find(std::string_view step) const;
+  /// The step's record anew, and none of those after it, which rested on the old one; but a warm-up changes nothing that
+  /// they found.
+  void put(StepRecord step);
+  RecordState state() const;
+  /// The largest of value / limit over all gates: 1 and more is refused; infinite without any.
+  double margin() const;
+};
+
+/// JSON, with its format; the same record gives the same text.
+std::string to_text(const Record& record);
+/// Errors: kInvalidArgument for what is damaged, saying where, or written by a newer version.
+Result<Record> record_from_text(std::string_view text, const std::string& file);
+
+/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise and hot pixels,
+/// and the projector's gamma, as measured. The sensitivity follows the gain, so that codes per radiance, which is what the one
+/// who gave it had measured, stay as given.
+capture::StationCalibration with_measured(capture::StationCalibration given,
+                                          const Measured& measured);
+
+}  // namespace opaline::calibration
