@@ -127,10 +127,12 @@ Result<StepRecord> black_level(StepContext& context) {
   const double hot_share = count / static_cast<double>(hot.samples().size());
   Measured& m = context.record.measured;
   std::vector<double> seconds;
+  seconds.reserve(sets.size());
   for (const DarkSet& set : sets) seconds.push_back(set.seconds);
   m.dark_codes_per_second = 0.0;
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<double> levels;
+    levels.reserve(sets.size());
     for (const DarkSet& set : sets) levels.push_back(channel_means(set.measured.mean, hot)[c]);
     const double slope = slope_through(seconds, levels);
     m.black_of_channels[c] = levels.front() - slope * seconds.front();

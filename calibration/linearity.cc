@@ -101,7 +101,7 @@ class Photometer {
   Result<std::array<double, 3>> measure(const FlatLight& light, int turns) {
     auto lit = rates(light, turns);
     if (!lit) return lit;
-    const auto dark = rates({0, 0, 0}, turns);
+    auto dark = rates({0, 0, 0}, turns);
     if (!dark) return dark;
     for (std::size_t c = 0; c < 3; ++c) (*lit)[c] -= (*dark)[c];
     return lit;
