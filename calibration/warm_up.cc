@@ -60,6 +60,7 @@ class Lamp {
 
 double flicker_of(const std::vector<Reading>& readings) {
   std::vector<double> sums;
+  sums.reserve(readings.size());
   for (const Reading& r : readings) sums.push_back(r.sum);
   return relative_deviation(sums);
 }
@@ -69,6 +70,7 @@ double beat_of(const std::vector<Reading>& readings) {
   double most = 0.0;
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<double> shares;
+    shares.reserve(readings.size());
     for (const Reading& r : readings) shares.push_back(r.channel[c] / r.sum);
     most = std::max(most, relative_deviation(shares));
   }
