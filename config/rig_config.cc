@@ -185,6 +185,9 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
                [&](Fields& f) { visit_sim_projector(f, sim.rig.projector); });
   fields.table({"transport", "How light travels in the sample (Monte Carlo)."},
                [&](Fields& f) { visit_transport(f, sim, check_files); });
+  fields.table(
+      {"sphere", "Translucent balls, which a simulated light stage shines on."},
+      [&](Fields& f) { visit_sim_sphere(f, sim.balls, sim.rig.projector.drift_per_hour); });
 }
 
 /// A simulated station knows itself.
@@ -328,6 +331,8 @@ void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
   fields.table({"projector", "Which projector."}, [&](Fields& f) {
     f.one_of({"driver", "its back end"}, rig.projector, kDriverNames);
   });
+  fields.table({"light_stage", "A sphere of lamps in place of the projector."},
+               [&](Fields& f) { visit_light_stage(f, rig.light_stage); });
   fields.table({"replay", "Photographs instead of devices."}, [&](Fields& f) {
     const bool used = rig.camera == Driver::kReplay || rig.projector == Driver::kReplay;
     visit_path(f,
@@ -340,7 +345,11 @@ void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
   });
   fields.table({"sim", "The simulated station, used by driver = \"sim\"."},
                [&](Fields& f) { visit_sim(f, rig.sim, check_files); });
-  if (fields.is_reading()) rig.calibration = truth_of(rig.sim.rig);
+  if (fields.is_reading()) {
+    rig.calibration = truth_of(rig.sim.rig);
+    rig.sim.lights.clear();
+    if (rig.light_stage.driver == StageDriver::kSim) rig.sim.lights = rig.light_stage.lights();
+  }
   fields.table({"calibration",
                 "What is known about the devices; of a simulated station the truth, unless given."},
                [&](Fields& f) { visit_calibration(f, rig); });

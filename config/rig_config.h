@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "base/block.h"
 #include "capture/calibration.h"
 #include "config/fields.h"
+#include "config/light_stage_config.h"
 #include "sim/light_transport.h"
 #include "sim/rig_options.h"
 #include "sim/scene.h"
@@ -37,6 +39,9 @@ struct SimConfig {
   sim::ResponseOptions transport;   ///< its camera_centre follows from the camera's pose
   std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
   std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
+  sim::LedSphereOptions balls;      ///< what a simulated light stage looks at
+  std::vector<SphereLight>
+      lights;  ///< of that stage, as believed; none: the station has a projector
 };
 
 /// A rig file: the devices of a station, and what is known about them.
@@ -44,12 +49,17 @@ struct RigConfig {
   std::string station = "demo";  ///< two jobs on one station exclude each other
   Driver camera = Driver::kSim;
   Driver projector = Driver::kSim;
+  LightStageConfig light_stage;         ///< in place of the projector, if it has a driver
   std::filesystem::path replay_folder;  ///< photographs and their index
   SimConfig sim;
   /// What the capture believes of the devices. On a simulated station the truth, unless given.
   capture::StationCalibration calibration;
 
-  bool is_simulated() const { return camera == Driver::kSim || projector == Driver::kSim; }
+  bool has_stage() const { return light_stage.driver != StageDriver::kNone; }
+  bool is_simulated() const {
+    return camera == Driver::kSim ||
+           (has_stage() ? light_stage.driver == StageDriver::kSim : projector == Driver::kSim);
+  }
 };
 
 /// Visits every key of a rig file. `check_files`: files it names must exist.

@@ -22,6 +22,8 @@ constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 2> kCameraNames{"refracted_ray", "surface"};
+constexpr std::array<std::string_view, 2> kKindNames{"block", "led_sphere"};
+constexpr std::array<std::string_view, 2> kPatternNames{"shifted", "split"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 2> kStructureNames{"separate", "shared"};
 constexpr std::array<std::string_view, 4> kModelNames{
@@ -170,6 +172,40 @@ void visit_preview(Fields& fields, PreviewOptions& p) {
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
 }
 
+void visit_led_sphere(Fields& fields, LedSphereOptions& o) {
+  capture::GradientOptions& c = o.capture;
+  std::size_t pattern = c.patterns.split ? 1 : 0;
+  fields.choice({"pattern", "of gradients: (1 + omega)/2, or their bright and dark halves"},
+                pattern,
+                kPatternNames);
+  c.patterns.split = pattern == 1;
+  fields.flag({"specular", "also a picture with parallel polarisers"}, c.patterns.specular);
+  fields.share({"object_threshold", "of a white surface: what is brighter is the object"},
+               c.object_threshold,
+               Range{.min = 0, .max = 1, .min_excluded = true, .max_excluded = true});
+  fields.share({"drift_limit", "of the lamps: more is told, ten times as much refused"},
+               c.drift_limit,
+               Range{.min = 0, .max = 1, .min_excluded = true});
+  fields.length_mm({"object_depth", "of its outline's plane before the sphere's middle"},
+                   c.object_depth_mm,
+                   Range::between(-1000, 1000));
+  fields.number(
+      {"ior", "relative refractive index of the object"}, o.ior, Range::between(1.3, 1.5));
+  fields.number({"ior_deviation", "how far that may be off; 0: it is known"},
+                o.ior_deviation,
+                Range::between(0, 0.1));
+  fields.whole(
+      {"edge_px", "left out along the object's outline"}, o.edge_px, Range::between(0, 100));
+  fields.share({"certain", "deviation of curvature and excess ratio that needs no larger window"},
+               o.certain,
+               Range{.min = 0, .max = 1, .min_excluded = true});
+  fields.number({"sigmas", "of what is called certain"}, o.sigmas, Range::between(0, 10));
+  fields.whole(
+      {"largest_window", "pixels on either side"}, o.largest_window, Range::between(2, 1000));
+  fields.share({"lamp_deviation", "of each lamp's intensity"}, o.lamp_deviation);
+  fields.share({"white_deviation", "of all reflectances"}, o.white_deviation);
+}
+
 /// Before all that the quality sets, so that what is written out has the last word.
 void visit_accuracy(Fields& fields, SessionConfig& session) {
   fields.one_of(
@@ -181,10 +217,18 @@ void visit_accuracy(Fields& fields, SessionConfig& session) {
 
 /// `agreement` with the rig, when that has been read.
 void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement = nullptr) {
+  const bool has_rig = agreement != nullptr;
   fields.text({"name", "of the session, for people"}, session.name);
   std::string rig_file = session.rig_file.string();
   fields.text({"rig", "the rig file", true}, rig_file);
   session.rig_file = rig_file;
+  fields.one_of({"kind", "what is measured, by what light"}, session.kind, kKindNames);
+  const bool in_sphere = session.kind == SessionKind::kLedSphere;
+  if (in_sphere) agreement = nullptr;
+  if (in_sphere && has_rig)
+    fields.check(session.rig.has_stage(),
+                 "kind",
+                 "the rig has no light stage; expected [light_stage] driver in its file");
   visit_accuracy(fields, session);
   fields.table({"sample", "What is measured."}, [&](Fields& f) {
     visit_sample(f, session);
@@ -196,6 +240,8 @@ void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement 
                [&](Fields& f) { visit_reconstruction(f, session); });
   fields.table({"preview", "How the report's pictures are made."},
                [&](Fields& f) { visit_preview(f, session.preview); });
+  fields.table({"led_sphere", "When kind = \"led_sphere\"."},
+               [&](Fields& f) { visit_led_sphere(f, session.led_sphere); });
   fields.check(!(session.target_error > 0.0) || session.capture.patterns.held_out_lights > 0,
                "target_error",
                "cannot be measured without capture.held_out_lights; expected 4 or more of those");
@@ -270,8 +316,9 @@ bool is_rig_file(const Source& source) {
   const auto has_one_of = [&](std::initializer_list<std::string_view> names) {
     return std::ranges::find_first_of(keys, names) != keys.end();
   };
-  return !has_one_of({"rig", "sample", "capture", "reconstruction", "preview"}) &&
-         has_one_of({"station", "camera", "projector", "sim", "calibration", "replay"});
+  return !has_one_of({"rig", "sample", "capture", "reconstruction", "preview", "led_sphere"}) &&
+         has_one_of(
+             {"station", "camera", "light_stage", "projector", "sim", "calibration", "replay"});
 }
 
 }  // namespace

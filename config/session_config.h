@@ -9,6 +9,7 @@
 #include "base/result.h"
 #include "base/session_directory.h"
 #include "capture/capture_options.h"
+#include "capture/gradient_sequence.h"
 #include "config/rig_config.h"
 #include "config/toml.h"
 #include "reconstruct/inverse_options.h"
@@ -27,6 +28,25 @@ struct PreviewOptions {
 enum class Quality : std::uint8_t { kDraft, kStandard, kReference };
 std::string_view to_string(Quality quality);  ///< "draft" | "standard" | "reference"
 
+/// What is measured, by what light.
+enum class SessionKind : std::uint8_t {
+  kBlock,      ///< a block under a projector: a volume of coefficients
+  kLedSphere,  ///< an object in a sphere of lights: scattering parameters of every pixel
+};
+
+/// [led_sphere]: how an object in a sphere of lights is captured, and what is asked of its maps.
+struct LedSphereOptions {
+  capture::GradientOptions capture;
+  double ior = 1.4;                ///< of the object; 1.3 to 1.5
+  double ior_deviation = 0.0;      ///< how far its index may be off; 0: it is known
+  int edge_px = 3;                 ///< pixels along the object's outline that are left out: blur
+  double certain = 0.05;           ///< MapOptions::certain
+  double sigmas = 2.0;             ///< MapOptions::sigmas
+  int largest_window = 32;         ///< pixels on either side
+  double lamp_deviation = 0.01;    ///< relative, of each lamp's intensity, independent
+  double white_deviation = 0.005;  ///< relative, of all reflectances
+};
+
 /// A session file with its rig file: all that a session is made from.
 struct SessionConfig {
   std::string name = "session";          ///< for people
@@ -36,6 +56,8 @@ struct SessionConfig {
   double target_error = 0.0;
   std::filesystem::path rig_file;
   RigConfig rig;
+  SessionKind kind = SessionKind::kBlock;
+  LedSphereOptions led_sphere;
   std::string sample_name = "sample";
   capture::SampleGeometry sample;
   capture::CaptureOptions capture;

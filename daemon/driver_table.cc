@@ -5,13 +5,16 @@
 #include <system_error>
 #include <utility>
 
+#include "capture/stage_projector.h"
 #include "daemon/runtime_paths.h"
 #include "daemon/simulated_rig.h"
 #include "drivers/replay/replay_camera.h"
 #include "drivers/replay/replay_projector.h"
+#include "drivers/udmx/udmx_stage.h"
 #include "sim/rig.h"
 #include "sim/rig_client.h"
 #include "sim/sim_camera.h"
+#include "sim/sim_light_stage.h"
 #include "sim/sim_projector.h"
 
 namespace opaline::daemon {
@@ -40,6 +43,15 @@ Result<std::unique_ptr<sim::RigPort>> connect_rig(const config::RigConfig& rig,
   process.identity = rig_identity(rig.sim);
   if (auto running = ensure_rig_process(process, stop); !running) return running.error();
   return std::unique_ptr<sim::RigPort>(std::make_unique<sim::RigClient>(process.socket));
+}
+
+std::unique_ptr<drivers::LightStage> make_stage(const config::RigConfig& rig,
+                                                sim::RigPort* simulated) {
+  if (rig.light_stage.driver == config::StageDriver::kSim)
+    return std::make_unique<sim::SimLightStage>(*simulated, rig.sim.lights);
+  drivers::UdmxOptions options = rig.light_stage.udmx;
+  options.lights = rig.light_stage.lights();
+  return std::make_unique<drivers::UdmxStage>(std::move(options), drivers::make_usb_bus());
 }
 
 }  // namespace
@@ -72,6 +84,11 @@ Result<std::unique_ptr<StationDevices>> StationDevices::create(const config::Rig
       devices->camera_ =
           std::make_unique<drivers::ReplayCamera>(rig.replay_folder, *devices->clock_);
       break;
+  }
+  if (rig.has_stage()) {
+    devices->light_stage_ = make_stage(rig, devices->rig_.get());
+    devices->projector_ = std::make_unique<capture::StageProjector>(*devices->light_stage_);
+    return devices;
   }
   switch (rig.projector) {
     case config::Driver::kSim:

@@ -10,6 +10,7 @@
 #include "capture/station.h"
 #include "config/rig_config.h"
 #include "drivers/camera.h"
+#include "drivers/light_stage.h"
 #include "drivers/projector.h"
 #include "sim/rig_port.h"
 
@@ -32,6 +33,7 @@ class StationDevices {
   std::unique_ptr<Clock> clock_;
   std::unique_ptr<sim::RigPort> rig_;
   std::unique_ptr<drivers::Camera> camera_;
+  std::unique_ptr<drivers::LightStage> light_stage_;  // null where the station has a projector
   std::unique_ptr<drivers::Projector> projector_;
 };
 

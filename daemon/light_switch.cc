@@ -1,5 +1,8 @@
 #include "daemon/light_switch.h"
 
+#include <memory>
+
+#include "drivers/udmx/udmx_stage.h"
 #include "sim/rig_client.h"
 
 namespace opaline::daemon {
@@ -18,8 +21,13 @@ Result<void> make_dark(const std::filesystem::path& socket) {
 }  // namespace
 
 std::function<Result<void>()> light_switch(const config::RigConfig& rig) {
-  const bool outlives_job =
-      rig.projector == config::Driver::kSim && rig.sim.run == config::RigPlace::kProcess;
+  if (rig.light_stage.driver == config::StageDriver::kUdmx) {
+    drivers::UdmxOptions options = rig.light_stage.udmx;
+    options.lights = rig.light_stage.lights();
+    return [options] { return drivers::UdmxStage(options, drivers::make_usb_bus()).blank(); };
+  }
+  const bool simulated = rig.has_stage() || rig.projector == config::Driver::kSim;
+  const bool outlives_job = simulated && rig.sim.run == config::RigPlace::kProcess;
   if (!outlives_job) return [] { return ok(); };
   return [socket = config::rig_socket(rig)] { return make_dark(socket); };
 }

@@ -24,6 +24,7 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include "base/sha256.h"
 #include "config/session_config.h"
 #include "daemon/jobs/version.h"
+#include "sim/led_sphere.h"
 #include "sim/rig_client.h"
 #include "sim/rig_message.h"
 #include "sim/transport_store.h"
@@ -142,6 +143,9 @@ std::string rig_identity(const config::SimConfig& sim) {
   session.rig.sim = sim;
   session.rig.sim.socket.clear();
   std::string text = config::to_toml(session);
+  for (const SphereLight& light : sim.lights)
+    text += fmt::format(
+        "{},{},{},{};", light.position.x, light.position.y, light.position.z, light.intensity);
   text += version();
   text += sim::transport_key(sim.scene, sim.transport);  // has the algorithm's version
   text += transport_checksum(sim.responses).value_or("");
@@ -152,11 +156,22 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
                                             EventSink& events,
                                             std::stop_token stop,
                                             Clock* clock) {
+  sim::RigOptions options = sim.rig;
+  options.identity = rig_identity(sim);
+  if (!sim.lights.empty()) {
+    options.projector.width = static_cast<int>(sim.lights.size()) + 1;
+    options.projector.height = 1;
+    options.projector.color_wheel = false;
+    options.projector.wheel_turn = std::chrono::milliseconds(1);
+    auto balls =
+        sim::LedSphere::create(sim.balls, sim.lights, options.camera, events, std::move(stop));
+    if (!balls) return balls.error();
+    return sim::Rig::create(
+        options, std::shared_ptr<const sim::LightPath>(*std::move(balls)), clock);
+  }
   auto responses = sim::load_or_compute(
       sim.scene, sim.transport, {sim.responses, sim.cache}, events, std::move(stop));
   if (!responses) return responses.error().in("light transport of the simulated sample");
-  sim::RigOptions options = sim.rig;
-  options.identity = rig_identity(sim);
   return sim::Rig::create(
       options, std::make_shared<const TransportResponses>(*std::move(responses)), clock);
 }

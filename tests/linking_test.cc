@@ -36,6 +36,7 @@ const std::set<std::string> kEverybodys{"ld-linux-x86-64",
 const std::set<std::string> kPictures{"libOpenImageIO", "libOpenImageIO_Util"};
 const std::set<std::string> kVolumes{"libImath-3_1", "libopenvdb", "libtbb"};
 const std::set<std::string> kProcessor{"libhwy"};
+const std::set<std::string> kUsb{"libusb-1.0"};
 
 std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
   std::set<std::string> all;
@@ -46,8 +47,8 @@ std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
 const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline", {"libcurl"}},
     {"opalined", {"libsqlite3"}},
-    {"opaline-capture", kPictures},
-    {"opaline-guardian", {}},
+    {"opaline-capture", join({kPictures, kUsb})},
+    {"opaline-guardian", kUsb},
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},
     {"opaline-reconstruct", join({kPictures, kVolumes, kProcessor})},
     {"opaline-render", join({kPictures, kVolumes})},

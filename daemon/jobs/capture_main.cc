@@ -1,6 +1,7 @@
 #include <stop_token>
 
 #include "base/log.h"
+#include "capture/gradient_sequence.h"
 #include "capture/sequence.h"
 #include "config/session_config.h"
 #include "daemon/driver_table.h"
@@ -14,6 +15,42 @@ namespace {
 
 using opaline::Result;
 namespace daemon = opaline::daemon;
+
+Result<void> capture_block(const opaline::config::SessionConfig& config,
+                           const opaline::capture::Station& station,
+                           const opaline::capture::Workplace& workplace,
+                           const std::stop_token& stop) {
+  const auto summary = opaline::capture::capture_session(
+      {config.capture, config.sample, config.rig.calibration}, station, workplace, stop);
+  if (!summary) return summary.error();
+  opaline::log::info("capture: {} lights, {} taken now, {} times taken again, {} unusable",
+                     summary->lights,
+                     summary->taken,
+                     summary->retaken,
+                     summary->unusable.size());
+  return opaline::ok();
+}
+
+Result<void> capture_sphere(const opaline::config::SessionConfig& config,
+                            const opaline::capture::Station& station,
+                            const opaline::capture::Workplace& workplace,
+                            const std::stop_token& stop) {
+  const auto summary = opaline::capture::capture_gradients({config.capture,
+                                                            config.led_sphere.capture,
+                                                            config.rig.calibration.camera,
+                                                            config.rig.light_stage.lights(),
+                                                            config.rig.light_stage.depolarised},
+                                                           station,
+                                                           workplace,
+                                                           stop);
+  if (!summary) return summary.error();
+  opaline::log::info("capture: {} pictures, {} taken now, {} times taken again, drift {:.2f} %",
+                     summary->pictures,
+                     summary->taken,
+                     summary->retaken,
+                     100.0 * summary->drift);
+  return opaline::ok();
+}
 
 Result<void> capture(daemon::JobContext& context) {
   const auto config = opaline::config::load_resolved(context.session);
@@ -32,21 +69,13 @@ Result<void> capture(daemon::JobContext& context) {
   const auto request = [&stop] { stop.request_stop(); };
   const std::stop_callback asked(context.stop, request);
   const std::stop_callback unguarded((*guardian)->death(), request);
-  const auto summary =
-      opaline::capture::capture_session({config->capture, config->sample, config->rig.calibration},
-                                        (*devices)->station(),
-                                        {directory, context.files, context.events},
-                                        stop.get_token());
-  if (!summary && (*guardian)->death().stop_requested()) {
+  const bool in_sphere = config->kind == opaline::config::SessionKind::kLedSphere;
+  const auto done = (in_sphere ? capture_sphere : capture_block)(
+      *config, (*devices)->station(), {directory, context.files, context.events}, stop.get_token());
+  if (!done && (*guardian)->death().stop_requested()) {
     return opaline::unavailable("the guardian died, and without one no light stays on");
   }
-  if (!summary) return summary.error();
-  opaline::log::info("capture: {} lights, {} taken now, {} times taken again, {} unusable",
-                     summary->lights,
-                     summary->taken,
-                     summary->retaken,
-                     summary->unusable.size());
-  return opaline::ok();
+  return done;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "config/session_config.h"
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/version.h"
+#include "daemon/scattering/sphere_maps.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/material_uncertainty.h"
 #include "reconstruct/summary.h"
@@ -95,9 +96,21 @@ std::string summary(const config::SessionConfig& config,
   return json.dump(2) + "\n";
 }
 
+Result<void> reconstruct_sphere(const config::SessionConfig& config, JobContext& job) {
+  const auto session = read_sphere_session(job.session, config.led_sphere);
+  if (!session) return session.error();
+  const auto maps =
+      find_maps(*session, config.led_sphere, config.reconstruction.threads, job.events, job.stop);
+  if (!maps) return maps.error();
+  if (auto written = write_maps(job.files, job.session, *maps); !written) return written;
+  const auto told = maps_summary(*maps, *session, config.led_sphere);
+  return write_whole(job.files, job.session.reconstruction(), told.dump(2) + "\n");
+}
+
 Result<void> reconstruct_session(JobContext& job) {
   const auto config = config::load_resolved(job.session);
   if (!config) return config.error();
+  if (config->kind == config::SessionKind::kLedSphere) return reconstruct_sphere(*config, job);
   const auto dataset = read_dataset(job.session.path());
   if (!dataset) return dataset.error().in("dataset");
   const auto back_end = reconstruct::make_back_end(config->reconstruction);
