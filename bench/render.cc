@@ -11,6 +11,7 @@
 #include "bench/render/radiance_error.h"
 #include "bench/render/render_case.h"
 #include "bench/render/sphere_error.h"
+#include "bench/render/transport_error.h"
 #include "bench/stopwatch.h"
 #include "render/graph/relaxation.h"
 #include "render/mesh/mesh_distance.h"
@@ -20,6 +21,7 @@
 //   sphere     error against the exact solution of a lit sphere, graph, finite elements and polygrid
 //   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1 against finite elements of half the size, 8 times
 //              as many, and what those themselves are still off (a third of what they differ from the same size, uniform)
+//   transport  their exitance against Monte Carlo through the tetrahedra, split into model, discretisation and noise
 //   mesh       seconds from a triangle mesh to a graph with its hierarchy; angles
 //   frames     frames a second of the diffusion pass, a light moving 2 degrees a frame; processor seconds of one such frame on
 //              one thread, which a busy machine hardly slows; iterations saved by warm starts, of the light and of a brush
@@ -77,6 +79,30 @@ void measure_accuracy() {
         bench::print_figure(
             "render.error_vs_fem_tets", which, static_cast<double>(marble.tetrahedra()), "1");
       }
+    }
+  }
+}
+
+void measure_transport() {
+  constexpr double kPhotons = 1.6e6;
+  ThreadTeam team(kThreads);
+  for (const char* name : {"torus", "figurine"}) {
+    const double spacing = render::spacing_for(render::estimate_volume(*bench::shape(name)), 1.4e5);
+    for (const auto& [collimated, light] :
+         {std::pair{false, "diffuse"}, std::pair{true, "collimated"}}) {
+      const auto error = bench::transport_error(name,
+                                                collimated,
+                                                {.method = render::Discretisation::kElements,
+                                                 .spacing_mm = spacing,
+                                                 .interior_growth = 0.1,
+                                                 .tolerance = 1e-8},
+                                                kPhotons,
+                                                team);
+      const std::string which = std::string(name) + "-" + light;
+      bench::print_figure("render.error_vs_monte_carlo", which, error.total, "1");
+      bench::print_figure("render.model_error", which, error.model, "1");
+      bench::print_figure("render.discretisation_error", which, error.discretisation, "1");
+      bench::print_figure("render.monte_carlo_noise", which, error.noise, "1");
     }
   }
 }
@@ -238,6 +264,7 @@ void measure_growth() {
 
 int main(int argc, char** argv) try {
   const std::map<std::string, std::function<void()>> groups{{"accuracy", measure_accuracy},
+                                                            {"transport", measure_transport},
                                                             {"sphere", measure_sphere},
                                                             {"mesh", measure_mesh},
                                                             {"frames", measure_frames},
@@ -247,13 +274,15 @@ int main(int argc, char** argv) try {
       "Accuracy and speed of the renderer's numerical ground.\n\nExample: scripts/bench render "
       "sphere mesh"};
   std::vector<std::string> chosen;
-  app.add_option(
-      "groups", chosen, "accuracy, sphere, mesh, frames, published, growth; all by default");
+  app.add_option("groups",
+                 chosen,
+                 "accuracy, transport, sphere, mesh, frames, published, growth; all by default");
   CLI11_PARSE(app, argc, argv);
   for (const auto& name : chosen) {
     if (groups.contains(name)) continue;
     opaline::log::error(
-        "no group \"{}\"; there are accuracy, sphere, mesh, frames, published, growth", name);
+        "no group \"{}\"; there are accuracy, transport, sphere, mesh, frames, published, growth",
+        name);
     return 2;
   }
   for (const auto& [name, measure] : groups) {

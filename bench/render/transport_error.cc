@@ -1,0 +1,190 @@
+#include "bench/render/transport_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "base/ensure.h"
+#include "base/log.h"
+#include "bench/render/render_case.h"
+#include "render/mesh/shapes.h"
+#include "render/scene/subsurface.h"
+#include "render/tetrahedra/stuffing.h"
+#include "sim/fresnel.h"
+#include "sim/tet_transport.h"
+
+namespace opaline::bench {
+namespace {
+
+constexpr Vec3 kTowards{0.6, 0.48, 0.64};
+constexpr double kPatch = 2.5;  // mm
+constexpr int kGreen = 1;
+
+/// Numbers patches by the cell of a grid that a place lies in.
+class Patches {
+ public:
+  int at(Vec3 p) {
+    const auto cell = [](double x) { return static_cast<int>(std::floor(x / kPatch)); };
+    return numbers_
+        .try_emplace({cell(p.x), cell(p.y), cell(p.z)}, static_cast<int>(numbers_.size()))
+        .first->second;
+  }
+  int count() const { return static_cast<int>(numbers_.size()); }
+
+ private:
+  std::map<std::array<int, 3>, int> numbers_;
+};
+
+struct Case {
+  const render::SignedDistance& solid;
+  double ior = 1.0;
+  /// q at a place of the surface with a normal: what is transmitted into it.
+  double q(Vec3 normal) const {
+    const double cosine = dot(normal, kTowards);
+    return cosine > 0.0 ? cosine * (1.0 - sim::reflectance(std::min(1.0, cosine), 1.0, ior)) : 0.0;
+  }
+};
+
+struct Exitance {
+  std::vector<double> power;  // that leaves each patch
+  std::vector<double> area;
+  void add(int patch, double watts, double square_mm) {
+    const auto size = std::max<std::size_t>(power.size(), static_cast<std::size_t>(patch) + 1);
+    power.resize(size);
+    area.resize(size);
+    power[patch] += watts;
+    area[patch] += square_mm;
+  }
+};
+
+Vec3 area_vector(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a) * 0.5; }
+
+Exitance diffused(const Case& lit,
+                  const render::DiffusionOptions& options,
+                  Patches& patches,
+                  ThreadTeam& team) {
+  const auto body =
+      render::Subsurface::create(lit.solid, marbled_optics, lit.ior, options, team, {});
+  ENSURE(body.has_value());
+  std::vector<std::array<float, 3>> q;
+  for (const auto& place : (*body)->places()) {
+    q.emplace_back().fill(static_cast<float>(lit.q(place.normal)));
+  }
+  ENSURE((*body)->light(q, {}).has_value());
+  const auto& mesh = (*body)->surface();
+  Exitance found;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3 a = mesh.vertices[i];
+    const Vec3 b = mesh.vertices[j];
+    const Vec3 c = mesh.vertices[k];
+    const Vec3 normal = area_vector(a, b, c);
+    const Vec3 centre = (a + b + c) * (1.0 / 3.0);
+    double net = 0.0;
+    for (const int v : {i, j, k}) net += (*body)->lit().net_flux[v][kGreen] / 3.0;
+    const double smooth = lit.q(lit.solid.normal(centre, 0.01));
+    found.add(patches.at(centre), (net + smooth) * length(normal), length(normal));
+  }
+  return found;
+}
+
+struct Traced {
+  Exitance exitance;
+  std::vector<double> error;  // of each patch's power
+};
+
+Traced traced(const Case& lit, double spacing, bool collimated, double photons, Patches& patches) {
+  const auto stuffed =
+      render::stuff(lit.solid, {.spacing_mm = spacing, .interior_growth = 0.1}, {});
+  ENSURE(stuffed.has_value());
+  const render::TetMesh mesh = render::pack(*stuffed);
+  sim::TetSolid solid{mesh.vertices, mesh.tets, {}, {}, lit.ior};
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    const render::Optics optics = marbled_optics(render::centroid_of(mesh, t));
+    solid.absorption.push_back(optics.absorption[kGreen]);
+    solid.scattering.push_back(1.0 / (3.0 * optics.diffusion[kGreen]) - optics.absorption[kGreen]);
+  }
+  Traced found;
+  std::vector<double> power;
+  std::vector<int> patch;
+  for (const auto& [tet, opposite] : sim::surface_faces(solid)) {
+    std::array<Vec3, 3> p;
+    for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[mesh.tets[tet][(opposite + 1 + k) % 4]];
+    const double area = length(area_vector(p[0], p[1], p[2]));
+    const Vec3 centre = (p[0] + p[1] + p[2]) * (1.0 / 3.0);
+    power.push_back(area * lit.q(lit.solid.normal(centre, 0.01)));
+    patch.push_back(patches.at(centre));
+    found.exitance.add(patch.back(), 0.0, area);
+  }
+  const auto result =
+      sim::trace_tets(solid,
+                      power,
+                      patch,
+                      {.entry = collimated ? sim::TetEntry::kCollimated : sim::TetEntry::kDiffuse,
+                       .direction = kTowards * -1.0,
+                       .count_unscattered = !collimated,
+                       .photons = static_cast<std::uint64_t>(photons),
+                       .threads = 2},
+                      {});
+  if (!result) log::error("{}", result.error().message);
+  ENSURE(result.has_value());
+  double entered = 0.0;
+  for (const double watts : power) entered += watts;
+  for (std::size_t k = 0; k < result->left.size(); ++k) {
+    found.exitance.power[k] = result->left[k] * entered;
+    found.error.push_back(result->standard_error[k] * entered);
+  }
+  return found;
+}
+
+/// Relative RMS of exitance, W/mm^2, over the area; `noise` of the second is taken out.
+double difference(const Exitance& a, const Exitance& b, double noise) {
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t k = 0; k < std::min(a.power.size(), b.power.size()); ++k) {
+    if (!(a.area[k] > 0.0) || !(b.area[k] > 0.0)) continue;
+    const double truth = b.power[k] / b.area[k];
+    error += b.area[k] * std::pow(a.power[k] / a.area[k] - truth, 2);
+    size += b.area[k] * truth * truth;
+  }
+  return std::sqrt(std::max(0.0, error / size - noise * noise));
+}
+
+double noise_of(const Traced& traced) {
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t k = 0; k < traced.error.size(); ++k) {
+    const double area = traced.exitance.area[k];
+    if (!(area > 0.0)) continue;
+    error += traced.error[k] * traced.error[k] / area;
+    size += traced.exitance.power[k] * traced.exitance.power[k] / area;
+  }
+  return std::sqrt(error / size);
+}
+
+}  // namespace
+
+TransportError transport_error(std::string_view name,
+                               bool collimated,
+                               const render::DiffusionOptions& options,
+                               double photons,
+                               ThreadTeam& team) {
+  const auto solid = shape(name);
+  const Case lit{*solid, collimated ? 1.3 : 1.0};
+  Patches patches;
+  render::DiffusionOptions finer = options;
+  finer.method = render::Discretisation::kElements;
+  finer.spacing_mm = 0.5 * options.spacing_mm;
+  const Exitance asked = diffused(lit, options, patches, team);
+  const Exitance fine = diffused(lit, finer, patches, team);
+  const Traced light = traced(lit, options.spacing_mm, collimated, photons, patches);
+  TransportError error;
+  error.noise = noise_of(light);
+  error.total = difference(asked, light.exitance, error.noise);
+  error.model = difference(fine, light.exitance, error.noise);
+  error.discretisation = difference(asked, fine, 0.0);
+  error.patches = patches.count();
+  return error;
+}
+
+}  // namespace opaline::bench

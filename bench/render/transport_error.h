@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string_view>
+
+#include "base/thread_team.h"
+#include "render/scene/scene.h"
+
+namespace opaline::bench {
+
+/// How far the exitance of a marbled solid (marbled_optics, green) is from Monte Carlo through its tetrahedra, in patches of
+/// 2.5 mm: relative RMS weighted by area, the Monte Carlo's own noise taken out in squares.
+struct TransportError {
+  double total = 0.0;  ///< diffusion as asked for, against Monte Carlo
+  double model = 0.0;  ///< diffusion on elements of half the size, against Monte Carlo
+  double discretisation =
+      0.0;             ///< diffusion as asked for, against that on elements of half the size
+  double noise = 0.0;  ///< of the Monte Carlo
+  int patches = 0;
+};
+
+/// Light q = n.l from one side, without shadows. Index-matched and diffuse; or collimated at eta = 1.3, transmitted and
+/// refracted after Fresnel. Light that leaves without a collision is left out of the collimated case.
+TransportError transport_error(std::string_view shape,
+                               bool collimated,
+                               const render::DiffusionOptions& options,
+                               double photons,
+                               ThreadTeam& team);
+
+}  // namespace opaline::bench
