@@ -75,10 +75,9 @@ void visit_environment(Fields& fields, EnvironmentOptions& e) {
 }
 
 void visit_diffusion(Fields& fields, DiffusionOptions& d) {
-  fields.one_of(
-      {"method", "volumes on a graph, the fastest; finite elements, the most exact; a lattice"},
-      d.method,
-      kMethods);
+  fields.one_of({"method", "the papers' graph by volumes; finite elements; the papers' lattice"},
+                d.method,
+                kMethods);
   fields.number({"tetrahedra", "about so many an object, if all were of one size"},
                 d.tetrahedra,
                 Range::between(100, 2e7));

@@ -114,7 +114,7 @@ struct PictureOptions {
 enum class Discretisation : std::uint8_t { kGraph, kElements, kPolygrid };
 
 struct DiffusionOptions {
-  Discretisation method = Discretisation::kGraph;
+  Discretisation method = Discretisation::kElements;
   double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
   double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
   double interior_growth = 0.1;  ///< the papers' K
