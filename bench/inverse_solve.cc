@@ -21,6 +21,7 @@
 #include "bench/forward/forward_case.h"
 #include "bench/inverse/finite_elements.h"
 #include "bench/inverse/material_cases.h"
+#include "bench/inverse/material_error.h"
 #include "bench/inverse/posterior_figures.h"
 #include "bench/inverse/timed_solver.h"
 #include "bench/inverse/transport_dataset.h"
@@ -298,6 +299,7 @@ Result<void> run(const Case& which,
     if (!truth) return truth.error();
     if (auto judged = judge(which, "truth_", measured, margin, *truth, options, **solver); !judged)
       return judged;
+    print_material_error(which.name, result->material, *truth, dataset.seen_face);
     if (extras.posterior) {
       auto printed = print_posterior(which.name, measured, *truth, *result, options, **solver);
       if (!printed) return printed;
@@ -352,6 +354,9 @@ int main(int argc, char** argv) try {
   bool edges = false;
   app.add_flag("--tv", edges, "Total variation as the regulariser, not H1");
   app.add_option("--model-error", options.model_error);
+  std::string camera(to_string(options.camera));
+  app.add_option("--camera", camera, "refracted_ray or surface")
+      ->check(CLI::IsMember({"refracted_ray", "surface"}));
   app.add_option("--discrepancy", options.discrepancy);
   app.add_option("--stalled", options.stalled);
   app.add_option("--tolerance", options.tolerance);
@@ -370,6 +375,8 @@ int main(int argc, char** argv) try {
   using reconstruct::diffusion::Precision;
   for (const Precision one : {Precision::kHalf, Precision::kSingle, Precision::kDouble})
     if (to_string(one) == precision) options.precision = one;
+  if (camera == to_string(reconstruct::CameraLaw::kSurface))
+    options.camera = reconstruct::CameraLaw::kSurface;
   if (ladder) options.model = reconstruct::Model::kAuto;
   if (gauss_newton) options.method = reconstruct::Method::kGaussNewton;
   if (edges) options.regularizer = reconstruct::Smoothness::kTotalVariation;
