@@ -27,7 +27,9 @@ struct StageRecord {
   Vec3 middle;            ///< what `middle_x`, `middle_y` see on the object's plane, mm
   double middle_x = 0.0;  ///< pixels
   double middle_y = 0.0;
-  double pixel_mm = 0.1;     ///< of a pixel on that plane
+  double pixel_mm = 0.1;  ///< of a pixel on that plane
+  double distance_mm =
+      0.0;  ///< of the camera from that plane; 0: so far that it sees no perspective
   double depolarised = 0.5;  ///< share of depolarised light that passes the crossed polarisers
   double drift = 0.0;        ///< relative change of the lamps from the first picture to the last
   bool split = false;        ///< gradients as two halves instead of shifted

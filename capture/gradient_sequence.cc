@@ -250,6 +250,7 @@ Result<void> GradientSequence::finish() {
   record.middle_x = camera.cx;
   record.middle_y = camera.cy;
   record.pixel_mm = distance / (0.5 * (camera.fx + camera.fy));
+  record.distance_mm = distance;
   record.depolarised = task_.depolarised;
   record.drift = summary_.drift;
   record.split = task_.gradient.patterns.split;

@@ -39,6 +39,7 @@ ordered_json to_json(const StageRecord& record) {
           {"middle_mm", to_json(record.middle)},
           {"middle_px", {record.middle_x, record.middle_y}},
           {"pixel_mm", record.pixel_mm},
+          {"distance_mm", record.distance_mm},
           {"depolarised", record.depolarised},
           {"drift", record.drift},
           {"split", record.split},
@@ -61,6 +62,7 @@ StageRecord record_from(const json& j) {
   record.middle_x = j.at("middle_px").at(0).get<double>();
   record.middle_y = j.at("middle_px").at(1).get<double>();
   record.pixel_mm = j.at("pixel_mm").get<double>();
+  record.distance_mm = j.at("distance_mm").get<double>();
   record.depolarised = j.at("depolarised").get<double>();
   record.drift = j.at("drift").get<double>();
   record.split = j.at("split").get<bool>();
@@ -69,6 +71,8 @@ StageRecord record_from(const json& j) {
 
 Result<void> check(const StageRecord& record) {
   if (record.lights.empty()) return invalid_argument("no lights");
+  if (!(record.distance_mm >= 0.0))
+    return invalid_argument(fmt::format("a camera at {} mm", record.distance_mm));
   if (!(record.pixel_mm > 0.0 && std::isfinite(record.pixel_mm)))
     return invalid_argument(fmt::format("pixels of {} mm", record.pixel_mm));
   for (const StagePicture& picture : record.pictures)

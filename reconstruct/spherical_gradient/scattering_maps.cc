@@ -29,6 +29,9 @@ Result<void> check(const GradientPictures& p, const MapOptions& options) {
     return invalid_argument(fmt::format("a mask of {} for {} pixels", p.measured.size(), count));
   if (!(p.pixel_mm > 0.0 && std::isfinite(p.pixel_mm)))
     return invalid_argument(fmt::format("pixels of {} mm; expected > 0", p.pixel_mm));
+  if (!p.pixel_scale.empty() && p.pixel_scale.size() != count)
+    return invalid_argument(
+        fmt::format("{} pixel scales for {} pixels", p.pixel_scale.size(), count));
   if (!(p.white > 0.0 && std::isfinite(p.white)))
     return invalid_argument(fmt::format("white of {}; expected > 0", p.white));
   if (options.half_windows.empty() ||
@@ -314,13 +317,15 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
     for (std::size_t at = share(thread); at < share(thread + 1); ++at) {
       const WindowValues& window = windows[at];
       if (values.measured[at] == 0 || window.count < 6) continue;
-      maps.curvature[at] = static_cast<float>(window.curvature / pictures.pixel_mm);
+      const double pixel_mm =
+          pictures.pixel_mm * (pictures.pixel_scale.empty() ? 1.0 : pictures.pixel_scale[at]);
+      maps.curvature[at] = static_cast<float>(window.curvature / pixel_mm);
       maps.left_out[at] = judge(window,
                                 flat.at(window.reflectance),
                                 ratio_variance(window, table, options),
                                 options.sigmas);
       if (maps.left_out[at] == LeftOut::kFound)
-        estimate_pixel(window, pictures.pixel_mm, table, options, at, last, maps);
+        estimate_pixel(window, pixel_mm, table, options, at, last, maps);
     }
   });
   return maps;

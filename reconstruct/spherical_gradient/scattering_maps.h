@@ -27,6 +27,9 @@ struct GradientPictures {
   std::array<std::vector<float>, 4> radiance;
   std::array<std::vector<float>, 4> variance;
   std::vector<std::uint8_t> measured;
+  /// How many times pixel_mm one step of a pixel goes along the object, across the line of sight, on average of row and column: perspective.
+  /// None: 1 everywhere.
+  std::vector<float> pixel_scale = {};
 };
 
 /// Why a pixel has no answer.

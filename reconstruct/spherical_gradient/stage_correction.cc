@@ -167,9 +167,16 @@ class Correction {
   }
 
   Vec3 place(int x, int y, double depth) const {
-    return {(x + 0.5 - stage_.middle_x) * stage_.pixel_mm,
-            (y + 0.5 - stage_.middle_y) * stage_.pixel_mm,
-            depth};
+    const double nearer = stage_.distance_mm > 0.0 ? 1.0 - depth / stage_.distance_mm : 1.0;
+    const double pixel = stage_.pixel_mm * nearer;
+    return {(x + 0.5 - stage_.middle_x) * pixel, (y + 0.5 - stage_.middle_y) * pixel, depth};
+  }
+  double pixel_scale(Vec3 place, const Measured& m) const {
+    if (!(stage_.distance_mm > 0.0) || !(m.gradient[2] > 0.0)) return 1.0;
+    const double slanted = (place.x * m.gradient[0] + place.y * m.gradient[1]) / m.gradient[2];
+    const double scale =
+        (1.0 - place.z / stage_.distance_mm) * (1.0 + 0.5 * slanted / stage_.distance_mm);
+    return std::clamp(scale, 0.8, 1.25);
   }
   double exit_law(double normal_z) const { return law_.at(normal_z); }
   double surroundings() const { return surroundings_; }
@@ -274,6 +281,7 @@ Result<GradientPictures> ideal_pictures(const StagePictures& p,
     out.radiance[k].assign(count, 0.0F);
     out.variance[k].assign(count, 0.0F);
   }
+  out.pixel_scale.assign(count, 1.0F);
   const std::vector<float> depth = depths(p, correction, stage.pixel_mm, team);
   team.run([&](int thread) {
     for (int y = thread; y < p.height; y += team.size())
@@ -289,6 +297,7 @@ Result<GradientPictures> ideal_pictures(const StagePictures& p,
             break;
           ideal = correction.corrected(raw, ideal, place);
         }
+        out.pixel_scale[at] = static_cast<float>(correction.pixel_scale(place, ideal));
         const double length = std::hypot(ideal.gradient[0], ideal.gradient[1], ideal.gradient[2]);
         const double law = correction.exit_law(length > 0.0 ? ideal.gradient[2] / length : 1.0);
         const double scale = raw.constant > 0.0 ? ideal.constant / raw.constant / law : 1.0 / law;

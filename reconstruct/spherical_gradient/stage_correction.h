@@ -41,6 +41,9 @@ struct StagePictures {
 /// A pixel's depth, which decides its distance to lamps, is taken from its normal and mean curvature, n_z / H over the object's plane (exact on
 /// balls; 0 to half the object's width).
 ///
+/// A camera at a finite distance d sees what is nearer larger: a step of a pixel is (1 - z/d) (1 + (X n_x + Y n_y) / (2 d n_z)) times pixel_mm on the
+/// object, X, Y from the picture's middle, z the depth, n the normal (pixel_scale; first order in the object's size over d).
+///
 /// What leaves towards the camera is more along the normal than at grazing angles; radiance becomes exitance over pi by
 /// (1 - F(n_z)) / (1 - 2 int F mu dmu), light that arrives evenly below the surface, `ior` its index.
 ///

@@ -64,6 +64,7 @@ TEST_F(GradientSequenceTest, TakesEveryPictureAndRecordsWhatItWas) {
   ASSERT_TRUE(record) << record.error().message;
   EXPECT_EQ(record->lights, tiny_.lights);
   EXPECT_NEAR(record->pixel_mm, 0.4, 1e-9);
+  EXPECT_NEAR(record->distance_mm, 1000.0, 1e-6);
   EXPECT_NEAR(length(record->middle), 0.0, 1e-9);
   EXPECT_NEAR(record->axes[1].y, -1.0, 1e-9);  // down the picture
   EXPECT_EQ(record->pictures[1].name, "gradient_x");

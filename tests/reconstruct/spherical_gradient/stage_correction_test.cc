@@ -39,6 +39,7 @@ struct Scene {
     record.middle_x = 90.0;
     record.middle_y = 55.0;
     record.pixel_mm = 0.2;
+    record.distance_mm = 1000.0;
   }
   StagePictures photograph(const capture::StagePatternOptions& how = {.specular = false}) {
     NullSink events;

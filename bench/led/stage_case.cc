@@ -1,0 +1,223 @@
+#include "bench/led/stage_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "base/ensure.h"
+#include "bench/stopwatch.h"
+#include "capture/stage_patterns.h"
+#include "drivers/stage_picture.h"
+
+namespace opaline::bench {
+namespace {
+
+using reconstruct::BallTable;
+using reconstruct::LeftOut;
+using reconstruct::StagePictures;
+
+constexpr double kFullWell = 30'000.0;
+constexpr double kFilled = 0.9;
+constexpr double kReadNoise = 3.0;
+constexpr double kSettle = 0.25;  // s, a pattern
+constexpr int kEdge = 2;          // pixels along the outline that are left out
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+}  // namespace
+
+int lamp_towards(int lamps, Vec3 direction) {
+  const auto all = light_sphere_directions(lamps);
+  const auto nearest = std::ranges::max_element(all, {}, [&](Vec3 d) { return dot(d, direction); });
+  return static_cast<int>(nearest - all.begin());
+}
+
+StageCase::StageCase(const StageScene& scene) : scene_(scene) {
+  sim::LedSphereOptions options;
+  options.radii_mm = scene.radii_mm;
+  options.reduced_albedo = {scene.reduced_albedo, scene.reduced_albedo, scene.reduced_albedo};
+  options.translucency_mm = {scene.translucency_mm, scene.translucency_mm, scene.translucency_mm};
+  options.ior = scene.ior;
+  options.paths = scene.paths;
+  options.dead_lights = scene.dead_lamps;
+  options.intensity_error = scene.intensity_error;
+  options.seed = scene.seed;
+  balls_ = sim::balls_of(options);
+  const double right = balls_.back().centre.x + balls_.back().radius_mm;
+  const double tall = *std::ranges::max_element(scene.radii_mm);
+  CameraModel& model = camera_.model;
+  model.width = 2 * static_cast<int>(right / scene.pixel_mm + 8.0);
+  model.height = 2 * static_cast<int>(tall / scene.pixel_mm + 8.0);
+  model.fx = model.fy = 1000.0 / scene.pixel_mm;
+  model.cx = 0.5 * model.width;
+  model.cy = 0.5 * model.height;
+  model.distortion = {};
+  model.camera_from_sample = look_at({0, 0, 1000}, {0, 0, 0}, {0, 1, 0});
+  record_.lights = light_sphere(scene.lamps, 600.0, 1.0);
+  record_.middle_x = model.cx;
+  record_.middle_y = model.cy;
+  record_.pixel_mm = scene.pixel_mm;
+  record_.distance_mm = 1000.0;
+  NullSink events;
+  auto made = sim::LedSphere::create(options, record_.lights, camera_, events, {});
+  ENSURE(made);
+  sphere_ = *std::move(made);
+}
+
+double StageCase::diffusion() const {
+  return sim::diffusion_of(scene_.reduced_albedo, scene_.translucency_mm);
+}
+
+std::vector<float> StageCase::light(const std::vector<std::uint8_t>& codes) const {
+  const Image<float> seen =
+      sphere_->light(drivers::stage_picture({1, codes}).codes).sensor_radiance;
+  std::vector<float> green;
+  for (std::size_t at = 0; at < seen.pixel_count(); ++at)
+    green.push_back(seen.samples()[3 * at + 1]);
+  return green;
+}
+
+StagePictures StageCase::photograph(const StageShot& shot) const {
+  const auto patterns = capture::stage_patterns(
+      record_.lights, record_.axes, {.split = shot.split, .specular = false});
+  ENSURE(patterns);
+  StagePictures p;
+  p.width = camera_.model.width;
+  p.height = camera_.model.height;
+  std::mt19937_64 random(shot.noise_seed);
+  std::normal_distribution<double> gaussian(0.0, 1.0);
+  std::vector<StagePictures::Picture> constants;
+  std::vector<std::uint8_t> clipped(static_cast<std::size_t>(p.width) * p.height, 0);
+  for (const capture::StageLight& pattern : *patterns) {
+    StagePictures::Picture picture{{}, {}, pattern.codes};
+    const std::vector<float> clean = light(pattern.codes);
+    const double brightest = *std::ranges::max_element(clean);
+    const double per_electron = brightest / (kFilled * kFullWell);
+    for (std::size_t at = 0; at < clean.size(); ++at) {
+      const double electrons = clean[at] / per_electron;
+      const double variance =
+          (electrons + kReadNoise * kReadNoise) / shot.frames * per_electron * per_electron;
+      picture.radiance.push_back(
+          static_cast<float>(clean[at] + std::sqrt(variance) * gaussian(random)));
+      picture.variance.push_back(static_cast<float>(variance));
+      if (shot.clip > 0.0 && pattern.name == "gradient_x" && clean[at] > shot.clip * brightest)
+        clipped[at] = 1;
+    }
+    if (pattern.name.starts_with("constant")) {
+      constants.push_back(std::move(picture));
+    } else if (pattern.name.ends_with("_minus")) {
+      p.minuses.push_back(std::move(picture));
+    } else {
+      p.gradients[static_cast<std::size_t>(pattern.name[9] - 'x')] = std::move(picture);
+    }
+  }
+  p.constant = constants[0];
+  for (std::size_t at = 0; at < p.constant.radiance.size(); ++at) {
+    p.constant.radiance[at] = 0.5F * (constants[0].radiance[at] + constants[1].radiance[at]);
+    p.constant.variance[at] = 0.25F * (constants[0].variance[at] + constants[1].variance[at]);
+  }
+  for (int y = 0; y < p.height; ++y)
+    for (int x = 0; x < p.width; ++x) {
+      bool inside = true;
+      for (const auto& [dx, dy] : {std::pair{-kEdge, 0}, {kEdge, 0}, {0, -kEdge}, {0, kEdge}})
+        inside =
+            inside && sim::see_ball(balls_, camera_.model, x + 0.5 + dx, y + 0.5 + dy).has_value();
+      const std::size_t at = static_cast<std::size_t>(y) * p.width + x;
+      p.measured.push_back(!inside            ? reconstruct::kNotSeen
+                           : clipped[at] != 0 ? reconstruct::kClipped
+                                              : reconstruct::kMeasured);
+    }
+  return p;
+}
+
+reconstruct::ScatteringMaps StageCase::estimate(const StagePictures& pictures,
+                                                const StageShot& shot,
+                                                ThreadTeam& team) const {
+  const auto table = BallTable::of_index(shot.ior);
+  const auto lower = BallTable::of_index(std::max(1.3, shot.ior - shot.ior_deviation));
+  const auto higher = BallTable::of_index(std::min(1.5, shot.ior + shot.ior_deviation));
+  ENSURE(table && lower && higher);
+  reconstruct::MapOptions options;
+  options.half_windows.clear();
+  for (int half = 2; half <= shot.largest_window; half *= 2) options.half_windows.push_back(half);
+  options.ratio_deviation = shot.lamp_deviation / std::sqrt(0.25 * scene_.lamps);
+  options.reflectance_deviation = 0.005;
+  if (shot.ior_deviation > 0.0) {
+    options.lower_index = &*lower;
+    options.higher_index = &*higher;
+  }
+  const auto ideal = reconstruct::ideal_pictures(pictures, record_, shot.ior, team);
+  ENSURE(ideal);
+  auto maps = reconstruct::estimate_scattering(*ideal, *table, options, team);
+  ENSURE(maps);
+  return *std::move(maps);
+}
+
+StageErrors StageCase::errors(const StagePictures& pictures,
+                              const reconstruct::ScatteringMaps& maps) const {
+  StageErrors e;
+  std::vector<double> offs;
+  std::vector<double> stated;
+  double pixels = 0.0;
+  for (int y = 0; y < maps.height; ++y)
+    for (int x = 0; x < maps.width; ++x) {
+      const std::size_t at = static_cast<std::size_t>(y) * maps.width + x;
+      const auto seen = sim::see_ball(balls_, camera_.model, x + 0.5, y + 0.5);
+      if (pictures.measured[at] == reconstruct::kNotSeen || !seen) continue;
+      pixels += 1.0;
+      e.reasons[static_cast<std::size_t>(maps.left_out[at])] += 1.0;
+      const Vec3 n = seen->normal;
+      const double cosine =
+          n.x * maps.normal_x[at] - n.y * maps.normal_y[at] + n.z * maps.normal_z[at];
+      if (pictures.measured[at] == reconstruct::kMeasured)
+        e.normal_deg += std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+      if (maps.left_out[at] != LeftOut::kFound) continue;
+      const double off = std::log(maps.diffusion[at] / diffusion());
+      offs.push_back(off);
+      stated.push_back(maps.log_diffusion_deviation[at]);
+      e.error += off * off;
+      e.albedo_error += std::abs(maps.reduced_albedo[at] / scene_.reduced_albedo - 1.0);
+      (std::abs(off) < 2.0 * stated.back() ? e.coverage : e.wrong) += 1.0;
+    }
+  const double found = std::max<double>(1.0, static_cast<double>(offs.size()));
+  e.error = std::sqrt(e.error / found);
+  e.albedo_error /= found;
+  e.coverage /= found;
+  e.wrong /= pixels;
+  e.found = static_cast<double>(offs.size()) / pixels;
+  e.normal_deg /= std::max(1.0, pixels - e.reasons[static_cast<std::size_t>(LeftOut::kSaturated)]);
+  for (double& share : e.reasons) share /= pixels;
+  e.bias = median(std::move(offs));
+  e.stated = median(std::move(stated));
+  return e;
+}
+
+StageErrors StageCase::run(const StageShot& shot, ThreadTeam& team) const {
+  const StagePictures pictures = photograph(shot);
+  const Stopwatch watch;
+  const auto maps = estimate(pictures, shot, team);
+  const double seconds = watch.seconds();
+  StageErrors e = errors(pictures, maps);
+  e.seconds = seconds;
+  return e;
+}
+
+double StageCase::capture_seconds(const StageShot& shot) const {
+  const auto patterns = capture::stage_patterns(
+      record_.lights, record_.axes, {.split = shot.split, .specular = false});
+  double seconds = 0.0;
+  for (const capture::StageLight& pattern : *patterns) {
+    const std::vector<float> clean = light(pattern.codes);
+    const double rate = camera_.sensitivity[1] * *std::ranges::max_element(clean);
+    seconds += kSettle + shot.frames * kFilled * kFullWell / rate;
+  }
+  return seconds;
+}
+
+}  // namespace opaline::bench
