@@ -13,6 +13,7 @@
 #include "capture/frame_store.h"
 #include "capture/hdr_file.h"
 #include "capture/hdr_merge.h"
+#include "capture/lamp_check.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
 #include "drivers/stage_picture.h"
@@ -24,6 +25,7 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 constexpr const char* kBlackName = "black";
+constexpr const char* kLampFile = "lamps.json";
 constexpr double kHopelessDrift = 10.0;  // over the limit
 
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
@@ -41,14 +43,11 @@ double mean(const Image<float>& picture, int x, int y) {
 /// One run over a session directory.
 class GradientSequence {
  public:
-  GradientSequence(const GradientTask& task,
-                   const Station& station,
-                   const Workplace& workplace,
-                   std::vector<StageLight> patterns)
+  GradientSequence(const GradientTask& task, const Station& station, const Workplace& workplace)
       : task_(task),
         station_(station),
         work_(workplace),
-        patterns_(std::move(patterns)),
+        lights_(task.lights),
         store_(workplace.files, workplace.directory / "frames"),
         seen_(task.camera.model.width, task.camera.model.height, 1, 1),
         started_(station.clock.now()) {}
@@ -62,6 +61,8 @@ class GradientSequence {
   Result<Frames> load(const std::string& name, const drivers::Pattern& pattern);
   Result<void> take_black(std::stop_token stop);
   void use_black(Frames frames);
+  Result<void> find_dead_lamps(std::stop_token stop);
+  Result<std::vector<int>> ask_lamps(std::stop_token stop);
   Result<Frames> frames_of(std::size_t n, std::stop_token stop);
   Result<Frames> take(std::size_t n, const drivers::Pattern& pattern, std::stop_token stop);
   Result<void> do_light(std::size_t n, std::stop_token stop);
@@ -74,6 +75,7 @@ class GradientSequence {
   const GradientTask& task_;
   const Station& station_;
   const Workplace& work_;
+  std::vector<SphereLight> lights_;  // as believed, dead ones with intensity 0
   std::vector<StageLight> patterns_;
   FrameStore store_;
   Image<std::uint8_t> seen_;  // pixels that see the object; all, until that is known
@@ -198,7 +200,7 @@ Result<void> GradientSequence::do_light(std::size_t n, std::stop_token stop) {
 }
 
 Result<void> GradientSequence::find_object(const HdrImage& constant) {
-  const double white = task_.depolarised * mean_radiance(task_.lights, patterns_[0].codes);
+  const double white = task_.depolarised * mean_radiance(lights_, patterns_[0].codes);
   std::size_t count = 0;
   for (int y = 0; y < seen_.height(); ++y)
     for (int x = 0; x < seen_.width(); ++x) {
@@ -242,7 +244,7 @@ Result<void> GradientSequence::finish() {
   if (auto steady = judge_drift(); !steady) return steady;
   const CameraModel& camera = task_.camera.model;
   StageRecord record;
-  record.lights = task_.lights;
+  record.lights = lights_;
   record.axes = axes_of(camera);
   const Vec3 eye = camera.centre();
   const double distance = dot(eye, record.axes[2]) - task_.gradient.object_depth_mm;
@@ -269,13 +271,60 @@ Result<void> GradientSequence::finish() {
                             {"drift", summary_.drift}});
 }
 
+/// Lights them one by one; devices are opened with options that ask for one good exposure.
+Result<std::vector<int>> GradientSequence::ask_lamps(std::stop_token stop) {
+  auto devices = taker(stop);  // for the black frames
+  if (!devices) return devices.error();
+  taker_.reset();
+  CaptureOptions quick = task_.options;
+  quick.exposures.wanted_snr = 0.01;
+  quick.retries = std::min(1, quick.retries);
+  auto single = RegionTaker::create(station_, {quick, task_.camera}, work_.events);
+  if (!single) return single.error();
+  const auto told = [this](int lamp, int of) {
+    work_.events.progress({"lamps",
+                           static_cast<double>(lamp) / of,
+                           std::nullopt,
+                           {{"light", lamp + 1}, {"lights", of}}});
+  };
+  const auto check = check_lamps(
+      **single, black_, task_.camera, lights_, axes_of(task_.camera.model)[2], told, stop);
+  if (!check) return check.error();
+  const nlohmann::ordered_json json{
+      {"format", 1}, {"tried", check->tried.size()}, {"dead", check->dead}};
+  auto written = write_whole(work_.files, work_.directory / kLampFile, json.dump() + "\n");
+  if (!written) return written.error();
+  auto noted =
+      work_.events.fact("stage.lamps", {{"tried", check->tried.size()}, {"dead", check->dead}});
+  if (!noted) return noted.error();
+  return check->dead;
+}
+
+Result<void> GradientSequence::find_dead_lamps(std::stop_token stop) {
+  if (!task_.gradient.check_lamps) return ok();
+  if (const auto text = read_text(work_.directory / kLampFile)) {
+    const auto json = nlohmann::json::parse(*text, nullptr, false);
+    if (const auto dead = json.find("dead"); json.is_object() && dead != json.end())
+      for (const auto& lamp : *dead)
+        if (lamp.is_number_unsigned()) summary_.dead_lamps.push_back(lamp.get<int>());
+  } else {
+    auto found = ask_lamps(stop);
+    if (!found) return found.error();
+    summary_.dead_lamps = *std::move(found);
+  }
+  for (const int lamp : summary_.dead_lamps) {
+    if (lamp < 0 || lamp >= std::ssize(lights_)) continue;
+    log::warning("lamp {} does not shine; the others make up for it", lamp);
+    lights_[static_cast<std::size_t>(lamp)].intensity = 0.0;
+  }
+  return ok();
+}
+
 Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
   for (const fs::path& directory : {store_.directory(), work_.directory / "hdr"}) {
     if (auto made = work_.files.make_directories(directory); !made) return made.error();
   }
   remove_partial_files(work_.files, work_.directory);
-  if (auto noted = work_.events.fact("capture.planned", {{"pictures", patterns_.size()}}); !noted)
-    return noted.error();
   auto black = load(
       kBlackName,
       picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern));
@@ -285,6 +334,12 @@ Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
   } else if (auto devices = taker(stop); !devices) {
     return devices.error();
   }
+  if (auto found = find_dead_lamps(stop); !found) return found.error();
+  auto patterns = stage_patterns(lights_, axes_of(task_.camera.model), task_.gradient.patterns);
+  if (!patterns) return patterns.error();
+  patterns_ = *std::move(patterns);
+  if (auto noted = work_.events.fact("capture.planned", {{"pictures", patterns_.size()}}); !noted)
+    return noted.error();
   for (std::size_t n = 0; n < patterns_.size(); ++n) {
     if (stop.stop_requested()) return cancelled(fmt::format("before {}", patterns_[n].name));
     if (auto done = do_light(n, stop); !done) return done.error();
@@ -324,9 +379,10 @@ Result<GradientSummary> capture_gradients(const GradientTask& task,
                                           std::stop_token stop) {
   if (auto good = validate(task.options); !good) return good.error();
   if (auto good = validate(task.gradient); !good) return good.error();
-  auto patterns = stage_patterns(task.lights, axes_of(task.camera.model), task.gradient.patterns);
-  if (!patterns) return patterns.error();
-  return GradientSequence(task, station, workplace, *std::move(patterns)).run(std::move(stop));
+  const auto possible =
+      stage_patterns(task.lights, axes_of(task.camera.model), task.gradient.patterns);
+  if (!possible) return possible.error();
+  return GradientSequence(task, station, workplace).run(std::move(stop));
 }
 
 }  // namespace opaline::capture

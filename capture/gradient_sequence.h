@@ -14,6 +14,8 @@ namespace opaline::capture {
 /// How an object is captured in a sphere of lights.
 struct GradientOptions {
   StagePatternOptions patterns;
+  bool check_lamps =
+      true;  ///< light each lamp alone first, and go on without those that do not shine
   double object_threshold =
       0.02;  ///< of a white surface's radiance: what is brighter is the object; 0 to 1 (excluded)
   double drift_limit = 0.01;  ///< relative, of the lamps from first to last picture; > 0
@@ -34,7 +36,8 @@ struct GradientSummary {
   int pictures = 0;
   int taken = 0;  ///< in this run
   int retaken = 0;
-  double drift = 0.0;  ///< relative
+  std::vector<int> dead_lamps;  ///< that were not known to be
+  double drift = 0.0;           ///< relative
 };
 
 /// Captures an object in a sphere of lights, or what is left of it: black, "constant", the gradients, "constant_parallel", "constant_again" (stage_patterns.h), each in
@@ -42,7 +45,10 @@ struct GradientSummary {
 /// then on only its pixels decide how long to expose. Lamps are taken to drift evenly from the first picture to the last, and the record
 /// says by how much each is brighter. Resumes as capture_session does.
 ///
-/// The station's projector is the stage (StageProjector). Facts: as capture_session, "stage.drift" {drift, limit} beyond the limit.
+/// Lamps that do not shine (lamp_check.h) are looked for first, once a session (lamps.json); the patterns then do without them, and the record
+/// says that they are dark.
+///
+/// The station's projector is the stage (StageProjector). Facts: as capture_session, "stage.lamps" {tried, dead}, "stage.drift" {drift, limit} beyond the limit.
 /// Errors: as capture_session; kUnavailable when nothing is seen (lamps, lens cap, polariser), and when the lamps drift by more than ten
 /// times the limit.
 Result<GradientSummary> capture_gradients(const GradientTask& task,

@@ -180,6 +180,8 @@ void visit_led_sphere(Fields& fields, LedSphereOptions& o) {
                 kPatternNames);
   c.patterns.split = pattern == 1;
   fields.flag({"specular", "also a picture with parallel polarisers"}, c.patterns.specular);
+  fields.flag({"check_lamps", "first light each lamp alone, and go on without dead ones"},
+              c.check_lamps);
   fields.share({"object_threshold", "of a white surface: what is brighter is the object"},
                c.object_threshold,
                Range{.min = 0, .max = 1, .min_excluded = true, .max_excluded = true});

@@ -68,6 +68,8 @@ StageCase::StageCase(const StageScene& scene) : scene_(scene) {
   auto made = sim::LedSphere::create(options, record_.lights, camera_, events, {});
   ENSURE(made);
   sphere_ = *std::move(made);
+  for (const int dead : scene.dead_lamps)
+    if (scene.dead_are_known) record_.lights[static_cast<std::size_t>(dead)].intensity = 0.0;
 }
 
 double StageCase::diffusion() const {

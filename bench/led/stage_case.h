@@ -24,7 +24,8 @@ struct StageScene {
   double ior = 1.4;
   std::int64_t paths = 300'000;  ///< a ball and channel
   double pixel_mm = 0.15;
-  std::vector<int> dead_lamps;  ///< that nobody knows of
+  std::vector<int> dead_lamps;
+  bool dead_are_known = false;  ///< as they are after capture/lamp_check.h
   double intensity_error = 0.0;
   std::uint64_t seed = 1;  ///< of paths and lamps
 };

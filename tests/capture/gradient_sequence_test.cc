@@ -33,7 +33,7 @@ class GradientSequenceTest : public ::testing::Test {
     return task;
   }
   Result<GradientSummary> capture(const GradientTask& task, std::stop_token stop = {}) {
-    const auto rig = tiny_.make_rig(traced_once(tiny_), &clock_);
+    const auto rig = tiny_.make_rig(traced_, &clock_);
     if (auto armed = rig->arm(faults_); !armed) return armed.error();
     sim::SimCamera camera(*rig);
     sim::SimLightStage stage(*rig, tiny_.lights);
@@ -48,6 +48,7 @@ class GradientSequenceTest : public ::testing::Test {
   auto results() { return support::files_below(directory_.path() / "hdr"); }
 
   TinySphere tiny_;
+  std::shared_ptr<const sim::LightPath> traced_ = traced_once(tiny_);
   sim::Faults faults_;
   ManualClock clock_;
   RecordingSink events_;
@@ -117,6 +118,24 @@ TEST_F(GradientSequenceTest, DriftIsMeasuredRecordedAndBeyondReasonRefused) {
   const auto refused = capture(slow);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("let them warm up"));
+}
+
+TEST_F(GradientSequenceTest, ALampThatDoesNotShineIsFoundAndDoneWithout) {
+  std::size_t front = 0;
+  for (std::size_t n = 0; n < tiny_.lights.size(); ++n)
+    if (tiny_.lights[n].position.z > tiny_.lights[front].position.z) front = n;
+  tiny_.sphere.dead_lights = {static_cast<int>(front)};
+  traced_ = tiny_.path();
+  const auto done = capture(task());
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(done->dead_lamps, std::vector<int>{static_cast<int>(front)});
+  const auto record = read_stage_record(directory_.path());
+  EXPECT_EQ(record->lights[front].intensity, 0.0);
+  EXPECT_EQ(record->pictures[0].codes[front], 0);
+  const auto again = capture(task());  // remembered
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->taken, 0);
+  EXPECT_EQ(again->dead_lamps, done->dead_lamps);
 }
 
 TEST_F(GradientSequenceTest, NothingInTheMiddleIsSaid) {

@@ -46,6 +46,8 @@ TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
                            "sim-rig.toml",
                            "sim_front_lit.toml",
                            "sim-rig-front-lit.toml",
+                           "led_sphere.toml",
+                           "sim-rig-sphere.toml",
                            "session.example.toml",
                            "rig.example.toml"}) {
     const auto problems = check(config_file(name));
