@@ -17,6 +17,7 @@ constexpr std::array<std::string_view, 3> kLightKinds{"directional", "point", "s
 constexpr std::array<std::string_view, 3> kPatternKinds{"none", "veins", "layers"};
 constexpr std::array<std::string_view, 3> kTilings{"clamp", "repeat", "mirror"};
 constexpr std::array<std::string_view, 3> kSpeculars{"none", "cook_torrance", "ward"};
+constexpr std::array<std::string_view, 2> kEntries{"collimated", "diffuse"};
 constexpr std::array<std::string_view, 3> kMethods{"graph", "elements", "polygrid"};
 constexpr std::array<std::string_view, 3> kBoundaries{"two_moment", "jensen", "keijzer"};
 constexpr double kFarthest = 1e6;  // mm
@@ -78,6 +79,10 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.one_of({"method", "the papers' graph by volumes; finite elements; the papers' lattice"},
                 d.method,
                 kMethods);
+  fields.one_of({"entry", "how lamps' light goes on behind the surface"}, d.entry, kEntries);
+  fields.check(d.method != Discretisation::kPolygrid || d.entry == Entry::kDiffuse,
+               "entry",
+               "beams are followed through tetrahedra: method = \"polygrid\" needs \"diffuse\"");
   fields.number({"tetrahedra", "about so many an object, if all were of one size"},
                 d.tetrahedra,
                 Range::between(100, 2e7));

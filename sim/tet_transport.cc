@@ -20,7 +20,7 @@ namespace {
 constexpr int kBatches = 64;
 constexpr double kDim = 1e-3;      // a photon's weight below which chance decides
 constexpr double kSurvives = 0.1;  // then
-constexpr int kMostFlights = 10'000'000;
+constexpr int kMostFlights = 1'000'000;
 
 struct Plane {
   Vec3 normal;  // outwards
@@ -287,6 +287,7 @@ Result<TetTransportResult> trace_tets(const TetSolid& solid,
   std::atomic<int> next{0};
   {
     std::vector<std::jthread> threads;
+    threads.reserve(options.threads);
     for (int t = 0; t < options.threads; ++t) {
       threads.emplace_back([&] {
         for (int b = next++; b < kBatches; b = next++) {

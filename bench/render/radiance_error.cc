@@ -59,7 +59,7 @@ LitMarble::LitMarble(const render::SignedDistance& solid,
   for (const render::SurfacePlace& place : body_->places()) {
     q.emplace_back().fill(static_cast<float>(std::max(0.0, dot(place.normal, kTowards))));
   }
-  const auto solved = body_->light(q, {});
+  const auto solved = body_->light(q, {}, {});
   if (!solved) log::error("{}", solved.error().message);
   ENSURE(solved.has_value());
 }

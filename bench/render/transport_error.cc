@@ -38,6 +38,7 @@ class Patches {
 
 struct Case {
   const render::SignedDistance& solid;
+  bool collimated = false;
   double ior = 1.0;
   /// q at a place of the surface with a normal: what is transmitted into it.
   double q(Vec3 normal) const {
@@ -60,6 +61,21 @@ struct Exitance {
 
 Vec3 area_vector(Vec3 a, Vec3 b, Vec3 c) { return cross(b - a, c - a) * 0.5; }
 
+/// A beam into each face that the light falls on, refracted (Snell).
+std::vector<render::Beam> beams_into(const Case& lit, const render::BeamDeposit& deposit) {
+  std::vector<render::Beam> beams;
+  for (std::size_t f = 0; f < deposit.faces().size(); ++f) {
+    const auto& face = deposit.faces()[f];
+    const Vec3 normal = face.middle.normal;
+    const double watts = face.area * lit.q(normal);
+    if (!(watts > 0.0)) continue;
+    const Vec3 tangent = (normal * dot(normal, kTowards) - kTowards) * (1.0 / lit.ior);
+    const Vec3 along = tangent - normal * std::sqrt(1.0 - dot(tangent, tangent));
+    beams.push_back({static_cast<int>(f), along, {watts, watts, watts}});
+  }
+  return beams;
+}
+
 Exitance diffused(const Case& lit,
                   const render::DiffusionOptions& options,
                   Patches& patches,
@@ -67,11 +83,16 @@ Exitance diffused(const Case& lit,
   const auto body =
       render::Subsurface::create(lit.solid, marbled_optics, lit.ior, options, team, {});
   ENSURE(body.has_value());
-  std::vector<std::array<float, 3>> q;
-  for (const auto& place : (*body)->places()) {
-    q.emplace_back().fill(static_cast<float>(lit.q(place.normal)));
+  std::vector<std::array<float, 3>> q((*body)->places().size());
+  std::vector<render::Beam> beams;
+  if (lit.collimated) {
+    beams = beams_into(lit, *(*body)->beams());
+  } else {
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      q[i].fill(static_cast<float>(lit.q((*body)->places()[i].normal)));
+    }
   }
-  ENSURE((*body)->light(q, {}).has_value());
+  ENSURE((*body)->light(q, beams, {}).has_value());
   const auto& mesh = (*body)->surface();
   Exitance found;
   for (const auto& [i, j, k] : mesh.triangles) {
@@ -82,8 +103,8 @@ Exitance diffused(const Case& lit,
     const Vec3 centre = (a + b + c) * (1.0 / 3.0);
     double net = 0.0;
     for (const int v : {i, j, k}) net += (*body)->lit().net_flux[v][kGreen] / 3.0;
-    const double smooth = lit.q(lit.solid.normal(centre, 0.01));
-    found.add(patches.at(centre), (net + smooth) * length(normal), length(normal));
+    const double in = lit.collimated ? 0.0 : lit.q(lit.solid.normal(centre, 0.01));
+    found.add(patches.at(centre), (net + in) * length(normal), length(normal));
   }
   return found;
 }
@@ -93,7 +114,7 @@ struct Traced {
   std::vector<double> error;  // of each patch's power
 };
 
-Traced traced(const Case& lit, double spacing, bool collimated, double photons, Patches& patches) {
+Traced traced(const Case& lit, double spacing, double photons, Patches& patches) {
   const auto stuffed =
       render::stuff(lit.solid, {.spacing_mm = spacing, .interior_growth = 0.1}, {});
   ENSURE(stuffed.has_value());
@@ -110,22 +131,25 @@ Traced traced(const Case& lit, double spacing, bool collimated, double photons, 
   for (const auto& [tet, opposite] : sim::surface_faces(solid)) {
     std::array<Vec3, 3> p;
     for (int k = 0; k < 3; ++k) p[k] = mesh.vertices[mesh.tets[tet][(opposite + 1 + k) % 4]];
-    const double area = length(area_vector(p[0], p[1], p[2]));
+    Vec3 facet = area_vector(p[0], p[1], p[2]);
+    const double area = length(facet);
     const Vec3 centre = (p[0] + p[1] + p[2]) * (1.0 / 3.0);
-    power.push_back(area * lit.q(lit.solid.normal(centre, 0.01)));
+    const Vec3 smooth = lit.solid.normal(centre, 0.01);
+    if (dot(facet, smooth) < 0.0) facet = facet * -1.0;
+    power.push_back(area * lit.q(lit.collimated ? normalized(facet) : smooth));
     patch.push_back(patches.at(centre));
     found.exitance.add(patch.back(), 0.0, area);
   }
-  const auto result =
-      sim::trace_tets(solid,
-                      power,
-                      patch,
-                      {.entry = collimated ? sim::TetEntry::kCollimated : sim::TetEntry::kDiffuse,
-                       .direction = kTowards * -1.0,
-                       .count_unscattered = !collimated,
-                       .photons = static_cast<std::uint64_t>(photons),
-                       .threads = 2},
-                      {});
+  const auto result = sim::trace_tets(
+      solid,
+      power,
+      patch,
+      {.entry = lit.collimated ? sim::TetEntry::kCollimated : sim::TetEntry::kDiffuse,
+       .direction = kTowards * -1.0,
+       .count_unscattered = !lit.collimated,
+       .photons = static_cast<std::uint64_t>(photons),
+       .threads = 2},
+      {});
   if (!result) log::error("{}", result.error().message);
   ENSURE(result.has_value());
   double entered = 0.0;
@@ -170,14 +194,14 @@ TransportError transport_error(std::string_view name,
                                double photons,
                                ThreadTeam& team) {
   const auto solid = shape(name);
-  const Case lit{*solid, collimated ? 1.3 : 1.0};
+  const Case lit{*solid, collimated, collimated ? 1.3 : 1.0};
   Patches patches;
   render::DiffusionOptions finer = options;
   finer.method = render::Discretisation::kElements;
   finer.spacing_mm = 0.5 * options.spacing_mm;
   const Exitance asked = diffused(lit, options, patches, team);
   const Exitance fine = diffused(lit, finer, patches, team);
-  const Traced light = traced(lit, options.spacing_mm, collimated, photons, patches);
+  const Traced light = traced(lit, options.spacing_mm, photons, patches);
   TransportError error;
   error.noise = noise_of(light);
   error.total = difference(asked, light.exitance, error.noise);

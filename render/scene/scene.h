@@ -113,12 +113,16 @@ struct PictureOptions {
 
 enum class Discretisation : std::uint8_t { kGraph, kElements, kPolygrid };
 
+/// How the light of lamps goes on behind the surface (docs/physics.md, "How light enters"); an environment's is diffuse.
+enum class Entry : std::uint8_t { kCollimated, kDiffuse };
+
 struct DiffusionOptions {
   Discretisation method = Discretisation::kElements;
-  double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
-  double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
-  double interior_growth = 0.1;  ///< the papers' K
-  double tolerance = 1e-4;       ///< relative residual
+  Entry entry = Entry::kCollimated;  ///< a polygrid takes kDiffuse whatever this is
+  double tetrahedra = 1e5;           ///< about so many an object, if they were all of one size; or
+  double spacing_mm = 0.0;           ///< this edge of the lattice; 0: from `tetrahedra`
+  double interior_growth = 0.1;      ///< the papers' K
+  double tolerance = 1e-4;           ///< relative residual
   int max_iterations = 300;
   reconstruct::diffusion::BoundaryModel boundary =
       reconstruct::diffusion::BoundaryModel::kTwoMoment;

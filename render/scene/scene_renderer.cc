@@ -48,6 +48,13 @@ void for_each(std::size_t count, ThreadTeam& team, const std::stop_token& stop, 
   });
 }
 
+/// The ray that goes on inside of light from `towards` (Snell).
+Vec3 refracted(Vec3 towards, Vec3 normal, double ior) {
+  const double cosine = dot(normal, towards);
+  const Vec3 tangent = (normal * cosine - towards) * (1.0 / ior);
+  return normalized(tangent - normal * std::sqrt(std::max(0.0, 1.0 - dot(tangent, tangent))));
+}
+
 }  // namespace
 
 CameraModel camera_of(const CameraOptions& camera, const PictureOptions& picture) {
@@ -206,30 +213,69 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
   return ok();
 }
 
-std::vector<std::array<float, 3>> SceneRenderer::entering(const Body& body, std::stop_token stop) {
+/// Light from a lamp on a place: W/mm^2 that passes the surface; black where it does not reach.
+Colour SceneRenderer::passed(const LightOptions& light,
+                             const LightSample& from,
+                             const SurfacePlace& place,
+                             double ior) const {
+  const double cosine = dot(place.normal, from.towards);
+  if (!(cosine > 0.0) || is_black(from.irradiance)) return {};
+  if (light.shadows && surfaces_.hides(place, from.towards, from.distance)) return {};
+  const double share = cosine * (1.0 - fresnel_reflectance(std::min(1.0, cosine), ior));
+  Colour q{};
+  for (int c = 0; c < 3; ++c) q[c] = share * from.irradiance[c];
+  return q;
+}
+
+void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token stop) {
   const auto& places = body.subsurface->places();
-  const auto& sky = body_sky_[&body - bodies_.data()];
   const double ior = looks_[body.object].ior;
-  std::vector<std::array<float, 3>> q(places.size());
   std::vector<std::atomic<bool>> reaches(lights_.size());
   for_each(places.size(), team_, stop, [&](std::size_t i) {
-    Colour sum{};
-    for (int c = 0; c < 3 && !sky.empty(); ++c) sum[c] = sky[i] * scene_.environment.radiance[c];
     for (std::size_t l = 0; l < lights_.size(); ++l) {
-      const LightSample from = sample(lights_[l], places[i].place);
-      const double cosine = dot(places[i].normal, from.towards);
-      if (!(cosine > 0.0) || is_black(from.irradiance)) continue;
-      if (lights_[l].shadows && surfaces_.hides(places[i], from.towards, from.distance)) continue;
-      reaches[l] = true;
-      const double passed = cosine * (1.0 - fresnel_reflectance(std::min(1.0, cosine), ior));
-      for (int c = 0; c < 3; ++c) sum[c] += passed * from.irradiance[c];
+      const Colour q = passed(lights_[l], sample(lights_[l], places[i].place), places[i], ior);
+      if (!is_black(q)) reaches[l] = true;
+      for (int c = 0; c < 3; ++c) light.q[i][c] += static_cast<float>(q[c]);
     }
-    for (int c = 0; c < 3; ++c) q[i][c] = static_cast<float>(sum[c]);
   });
   for (std::size_t l = 0; l < lights_.size(); ++l) {
     if (reaches[l]) light_reaches_[l] = true;
   }
-  return q;
+}
+
+void SceneRenderer::send_beams(const Body& body, Entering& light, std::stop_token stop) {
+  const auto& faces = body.subsurface->beams()->faces();
+  const double ior = looks_[body.object].ior;
+  for (std::size_t l = 0; l < lights_.size(); ++l) {
+    std::vector<Beam> beams(faces.size());
+    for_each(faces.size(), team_, stop, [&](std::size_t f) {
+      const LightSample from = sample(lights_[l], faces[f].middle.place);
+      const Colour q = passed(lights_[l], from, faces[f].middle, ior);
+      if (is_black(q)) return;
+      beams[f] = {static_cast<int>(f), refracted(from.towards, faces[f].middle.normal, ior), q};
+      for (double& watts : beams[f].power) watts *= faces[f].area;
+    });
+    std::erase_if(beams, [](const Beam& beam) { return is_black(beam.power); });
+    if (!beams.empty()) light_reaches_[l] = true;
+    light.beams.insert(light.beams.end(), beams.begin(), beams.end());
+  }
+}
+
+SceneRenderer::Entering SceneRenderer::entering(const Body& body, std::stop_token stop) {
+  const auto& sky = body_sky_[&body - bodies_.data()];
+  Entering light;
+  light.q.resize(body.subsurface->places().size());
+  for (std::size_t i = 0; i < sky.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      light.q[i][c] = static_cast<float>(sky[i] * scene_.environment.radiance[c]);
+    }
+  }
+  if (scene_.diffusion.entry == Entry::kCollimated && body.subsurface->beams() != nullptr) {
+    send_beams(body, light, stop);
+  } else {
+    let_in(body, light, stop);
+  }
+  return light;
 }
 
 Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::stop_token stop) {
@@ -237,14 +283,14 @@ Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::
   light_reaches_.assign(lights.size(), false);
   statistics_.light_seconds = statistics_.solve_seconds = 0.0;
   for (const Body& body : bodies_) {
-    std::vector<std::array<float, 3>> q;
+    Entering light;
     {
       const Stopwatch watch(statistics_.light_seconds);
-      q = entering(body, stop);
+      light = entering(body, stop);
       if (stop.stop_requested()) return cancelled("lighting");
     }
     const Stopwatch watch(statistics_.solve_seconds);
-    const auto solved = body.subsurface->light(q, stop);
+    const auto solved = body.subsurface->light(light.q, light.beams, stop);
     SceneStatistics::Object& object = statistics_.objects[body.object];
     if (!solved) return solved.error().in(fmt::format("object \"{}\"", object.name));
     object.iterations = solved->iterations;

@@ -38,12 +38,12 @@ struct SceneStatistics {
   std::vector<std::string> notes;     ///< what a user should know
 };
 
-/// A scene made ready once, then lit and drawn as often as wanted: translucent objects by diffusion (subsurface.h), light
-/// entering as `surface` light of docs/physics.md,
+/// A scene made ready once, then lit and drawn as often as wanted: translucent objects by diffusion (subsurface.h), all
+/// objects seen by rays (painter.h). Into a translucent one enters, where nothing hides it,
 ///
-///   q = sum of lights (1 - R(n.l)) E (n.l) [not hidden] + int (1 - R(mu)) L_env mu dw [not hidden],
-///
-/// all objects seen by rays (painter.h).
+///   of the environment   q = int (1 - R(mu)) L_env mu dw, diffuse
+///   of each light        q = (1 - R(n.l)) E (n.l), as a beam from the middle of each face along the refracted ray
+///                        (beam_deposit.h), or diffuse as well (Entry)
 ///
 /// Left out: light between objects beyond shadows; single scattering; light through a translucent object that never
 /// scattered.
@@ -80,7 +80,17 @@ class SceneRenderer {
   Result<void> add_opaque(const ObjectOptions& object, std::stop_token stop);
   void note_resolution(const ObjectOptions& object, const Subsurface::Report& report);
   Result<void> look_at_sky(std::stop_token stop);
-  std::vector<std::array<float, 3>> entering(const Body& body, std::stop_token stop);
+  struct Entering {
+    std::vector<std::array<float, 3>> q;  ///< diffuse, of each of the body's places
+    std::vector<Beam> beams;
+  };
+  Entering entering(const Body& body, std::stop_token stop);
+  Colour passed(const LightOptions& light,
+                const LightSample& from,
+                const SurfacePlace& place,
+                double ior) const;
+  void let_in(const Body& body, Entering& light, std::stop_token stop);
+  void send_beams(const Body& body, Entering& light, std::stop_token stop);
   void leave_out();
 
   Scene scene_;

@@ -19,7 +19,6 @@ namespace opaline::render {
 namespace {
 
 using reconstruct::diffusion::Boundary;
-using reconstruct::diffusion::SolveOptions;
 using reconstruct::diffusion::SolveSummary;
 using reconstruct::diffusion::Termination;
 using Values = std::vector<std::array<float, 3>>;
@@ -83,6 +82,7 @@ template <class T, class Graph>
 class GraphSubsurface final : public Subsurface {
  public:
   static Result<std::unique_ptr<Subsurface>> create(Graph graph,
+                                                    TetMesh mesh,
                                                     const MaterialAt& material,
                                                     const Boundary& boundary,
                                                     ThreadTeam& team,
@@ -91,6 +91,9 @@ class GraphSubsurface final : public Subsurface {
     const std::vector<Optics> optics = optics_at(made->graph_.inner, material, team);
     if (auto taken = made->diffusion_.set_material(optics); !taken) return taken.error();
     note_lengths(report, optics);
+    if constexpr (std::is_same_v<Graph, QuadGraph>) {
+      made->beams_ = std::make_unique<BeamDeposit>(std::move(mesh), optics);
+    }
     report.unknowns = optics.size();
     made->report_ = report;
     made->solver_ = std::make_unique<LaneSolver<T>>(
@@ -98,11 +101,11 @@ class GraphSubsurface final : public Subsurface {
     return made;
   }
 
-  void take_surface(TriangleMesh surface,
+  void take_surface(const TriangleMesh& surface,
                     const SignedDistance& solid,
                     const DiffusionOptions& options) {
     options_ = options;
-    surface_ = std::move(surface);
+    surface_ = surface;
     places_ = places_of(graph_, solid);
     if constexpr (std::is_same_v<Graph, Polygrid>) {
       std::vector<Vec3> nodes;
@@ -113,8 +116,17 @@ class GraphSubsurface final : public Subsurface {
   }
 
  protected:
-  SolveSummary solve(std::span<const std::array<float, 3>> q, std::stop_token stop) override {
+  SolveSummary solve(std::span<const std::array<float, 3>> q,
+                     std::span<const Beam> beams,
+                     std::stop_token stop) override {
     diffusion_.load(q, load_);
+    for (const Beam& beam : beams) {
+      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
+        for (int c = 0; c < 3; ++c) {
+          load_[d.tet].set(c, load_[d.tet][c] + static_cast<T>(d.power[c]));
+        }
+      });
+    }
     return solver_->solve(
         load_,
         phi_,
@@ -176,6 +188,7 @@ class ElementsSubsurface final : public Subsurface {
     auto elements = FiniteElements::create(made->mesh_, optics, boundary);
     if (!elements) return elements.error();
     made->elements_ = std::make_unique<FiniteElements>(*std::move(elements));
+    made->beams_ = std::make_unique<BeamDeposit>(made->mesh_, optics);
     note_lengths(report, optics);
     report.unknowns = made->mesh_.vertices.size();
     made->report_ = report;
@@ -186,9 +199,20 @@ class ElementsSubsurface final : public Subsurface {
   }
 
  protected:
-  SolveSummary solve(std::span<const std::array<float, 3>> q, std::stop_token stop) override {
+  SolveSummary solve(std::span<const std::array<float, 3>> q,
+                     std::span<const Beam> beams,
+                     std::stop_token stop) override {
+    std::vector<Lanes<double>> load = elements_->load(on_mesh(q));
+    for (const Beam& beam : beams) {
+      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
+        for (int k = 0; k < 4; ++k) {
+          Lanes<double>& sum = load[mesh_.tets[d.tet][k]];
+          for (int c = 0; c < 3; ++c) sum.set(c, sum[c] + d.corners[c][k] * d.power[c]);
+        }
+      });
+    }
     return solver_->solve(
-        elements_->load(on_mesh(q)),
+        load,
         phi_,
         {.tolerance = options_.tolerance, .max_iterations = options_.max_iterations},
         stop);
@@ -247,14 +271,16 @@ double spacing_of(const SignedDistance& solid, const DiffusionOptions& options) 
 
 template <class T, class Graph>
 Result<std::unique_ptr<Subsurface>> graph_subsurface(Graph graph,
-                                                     TriangleMesh surface,
+                                                     TetMesh mesh,
                                                      const SignedDistance& solid,
                                                      const Subsurface::MaterialAt& material,
                                                      const Boundary& boundary,
                                                      const DiffusionOptions& options,
                                                      ThreadTeam& team,
                                                      const Subsurface::Report& report) {
-  auto made = GraphSubsurface<T, Graph>::create(std::move(graph), material, boundary, team, report);
+  const TriangleMesh surface = surface_mesh(mesh);
+  auto made = GraphSubsurface<T, Graph>::create(
+      std::move(graph), std::move(mesh), material, boundary, team, report);
   if (made) {
     static_cast<GraphSubsurface<T, Graph>&>(**made).take_surface(
         std::move(surface), solid, options);
@@ -264,7 +290,7 @@ Result<std::unique_ptr<Subsurface>> graph_subsurface(Graph graph,
 
 template <class Graph>
 Result<std::unique_ptr<Subsurface>> graph_of_precision(Graph graph,
-                                                       TriangleMesh surface,
+                                                       TetMesh mesh,
                                                        const SignedDistance& solid,
                                                        const Subsurface::MaterialAt& material,
                                                        const Boundary& boundary,
@@ -273,8 +299,7 @@ Result<std::unique_ptr<Subsurface>> graph_of_precision(Graph graph,
                                                        const Subsurface::Report& report) {
   const auto make = options.tolerance < kSinglePrecision ? graph_subsurface<double, Graph>
                                                          : graph_subsurface<float, Graph>;
-  return make(
-      std::move(graph), std::move(surface), solid, material, boundary, options, team, report);
+  return make(std::move(graph), std::move(mesh), solid, material, boundary, options, team, report);
 }
 
 Result<TetMesh> cut(const SignedDistance& solid,
@@ -311,21 +336,15 @@ Result<std::unique_ptr<Subsurface>> set_up(TetMesh mesh,
     return ElementsSubsurface::create(
         std::move(mesh), material, boundary, solid, options, team, report);
   }
-  TriangleMesh surface = surface_mesh(mesh);
   if (options.method == Discretisation::kGraph) {
-    return graph_of_precision(make_quad_graph(mesh),
-                              std::move(surface),
-                              solid,
-                              material,
-                              boundary,
-                              options,
-                              team,
-                              report);
+    QuadGraph graph = make_quad_graph(mesh);
+    return graph_of_precision(
+        std::move(graph), std::move(mesh), solid, material, boundary, options, team, report);
   }
   auto grid = make_polygrid(solid, report.spacing_mm, stop);
   if (!grid) return grid.error();
   return graph_of_precision(
-      *std::move(grid), std::move(surface), solid, material, boundary, options, team, report);
+      *std::move(grid), std::move(mesh), solid, material, boundary, options, team, report);
 }
 
 }  // namespace
@@ -350,8 +369,9 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(const SignedDistance& sol
 }
 
 Result<SolveSummary> Subsurface::light(std::span<const std::array<float, 3>> q,
+                                       std::span<const Beam> beams,
                                        std::stop_token stop) {
-  const SolveSummary summary = solve(q, stop);
+  const SolveSummary summary = solve(q, beams, stop);
   if (summary.termination == Termination::kCancelled) return cancelled("solving for the light");
   if (!(summary.relative_residual <= kFarOff * options_.tolerance)) {
     return internal_error(

@@ -11,6 +11,7 @@
 #include "reconstruct/diffusion/fluence_solver.h"
 #include "render/graph/optics.h"
 #include "render/mesh/signed_distance.h"
+#include "render/scene/beam_deposit.h"
 #include "render/scene/scene.h"
 #include "render/scene/surfaces.h"
 #include "render/tetrahedra/tet_mesh.h"
@@ -58,15 +59,19 @@ class Subsurface {
   const Report& report() const { return report_; }
   /// Where q is asked for.
   const std::vector<SurfacePlace>& places() const { return places_; }
-  /// Solves for light q, W/mm^2 transmitted into the surface, one value a place. Errors: kCancelled; kInternal where the
+  /// What beams enter through; none on a polygrid, which has no tetrahedra to follow them in.
+  const BeamDeposit* beams() const { return beams_.get(); }
+  /// Solves for light q, W/mm^2 transmitted into the surface and diffuse behind it, one value a place, and for beams. Errors: kCancelled; kInternal where the
   /// solution did not get below ten times the tolerance.
   Result<reconstruct::diffusion::SolveSummary> light(std::span<const std::array<float, 3>> q,
+                                                     std::span<const Beam> beams,
                                                      std::stop_token stop);
   /// Of the last solution, one value a vertex of surface().
   const SurfaceLight& lit() const { return lit_; }
 
  protected:
   virtual reconstruct::diffusion::SolveSummary solve(std::span<const std::array<float, 3>> q,
+                                                     std::span<const Beam> beams,
                                                      std::stop_token stop) = 0;
   virtual SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const = 0;
 
@@ -74,6 +79,7 @@ class Subsurface {
   std::vector<SurfacePlace> places_;
   Report report_;
   DiffusionOptions options_;
+  std::unique_ptr<BeamDeposit> beams_;
 
  private:
   SurfaceLight lit_;

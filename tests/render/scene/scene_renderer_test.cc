@@ -114,6 +114,7 @@ TEST(SceneRenderer, ASphereUnderADirectionalLightShowsTheExactRadiance) {
        {Discretisation::kGraph, Discretisation::kElements, Discretisation::kPolygrid}) {
     Scene scene = scene_of({sphere()});
     scene.diffusion.method = method;
+    scene.diffusion.entry = Entry::kDiffuse;
     scene.lights = {sun({-1.0, 0.0, -0.5})};
     const Vec3 axis = normalized({1.0, 0.0, 0.5});
     const auto q = [](double cosine) { return std::max(0.0, cosine) * transmitted(cosine, kIor); };

@@ -66,8 +66,8 @@ TEST(Subsurface, ASphereWithACoreShinesAsItsClosedForm) {
           team,
           {});
       ASSERT_TRUE(body) << body.error().message;
-      ASSERT_TRUE(
-          (*body)->light(std::vector((*body)->places().size(), std::array{1.0F, 1.0F, 1.0F}), {}));
+      ASSERT_TRUE((*body)->light(
+          std::vector((*body)->places().size(), std::array{1.0F, 1.0F, 1.0F}), {}, {}));
       double error = 0.0;
       for (const auto& fluence : (*body)->lit().fluence)
         error += std::pow(fluence[0] / truth - 1.0, 2);
@@ -91,7 +91,7 @@ TEST(Subsurface, TheSameThingAHundredthOrAThousandMillimetresLargeShinesTheSame)
     for (const auto& place : (*body)->places()) {
       q.emplace_back().fill(static_cast<float>(std::max(0.0, place.normal.z)));
     }
-    ASSERT_TRUE((*body)->light(q, {}));
+    ASSERT_TRUE((*body)->light(q, {}, {}));
     double sum = 0.0;
     for (const auto& fluence : (*body)->lit().fluence) sum += fluence[1];
     sums.push_back(sum / static_cast<double>(q.size()));
@@ -114,7 +114,7 @@ TEST(Subsurface, AContrastOfAMillionIsSolvedByEveryMethod) {
         {});
     ASSERT_TRUE(body) << body.error().message;
     const auto solved =
-        (*body)->light(std::vector((*body)->places().size(), std::array{1.0F, 1.0F, 1.0F}), {});
+        (*body)->light(std::vector((*body)->places().size(), std::array{1.0F, 1.0F, 1.0F}), {}, {});
     ASSERT_TRUE(solved) << solved.error().message;
     EXPECT_LE(solved->relative_residual, 1e-3);
     for (const auto& fluence : (*body)->lit().fluence) EXPECT_TRUE(std::isfinite(fluence[0]));

@@ -1,0 +1,76 @@
+#include "render/scene/beam_deposit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace opaline::render {
+namespace {
+
+constexpr double kSpent = 1e-4;
+constexpr int kMostSteps = 10'000;
+
+/// Where along t scattering happens on average, as a share of it: 1/t - 1/(e^t - 1).
+double centroid(double t) { return t < 1e-3 ? 0.5 - t / 12.0 : 1.0 / t - 1.0 / std::expm1(t); }
+
+}  // namespace
+
+BeamDeposit::BeamDeposit(TetMesh mesh, std::vector<Optics> optics)
+    : mesh_(std::move(mesh)), optics_(std::move(optics)), neighbours_(neighbours_of(mesh_)) {
+  for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
+    for (int k = 0; k < 4; ++k) {
+      if (neighbours_[t][k] >= 0) continue;
+      const auto face = face_of(mesh_.tets[t], k);
+      const Vec3 a = mesh_.vertices[face[0]];
+      const Vec3 b = mesh_.vertices[face[1]];
+      const Vec3 c = mesh_.vertices[face[2]];
+      const Vec3 n = cross(b - a, c - a);
+      faces_.push_back({{(a + b + c) * (1.0 / 3.0), normalized(n), std::sqrt(length(n))},
+                        static_cast<int>(t),
+                        0.5 * length(n)});
+    }
+  }
+}
+
+BeamDeposit::Deposit BeamDeposit::step(Walk& walk) const {
+  const auto& tet = mesh_.tets[walk.tet];
+  std::array<double, 4> here{};  // barycentric coordinates, and how they change along the beam
+  std::array<double, 4> slope{};
+  double length_left = std::numeric_limits<double>::infinity();
+  int out = -1;
+  const double volume = 6.0 * volume_of(mesh_, static_cast<std::size_t>(walk.tet));
+  for (int k = 0; k < 4; ++k) {
+    const auto face = face_of(tet, k);
+    const Vec3 a = mesh_.vertices[face[0]];
+    const Vec3 n = cross(mesh_.vertices[face[1]] - a, mesh_.vertices[face[2]] - a);
+    here[k] = dot(a - walk.place, n) / volume;
+    slope[k] = -dot(walk.beam.along, n) / volume;
+    if (slope[k] >= 0.0 || (walk.from >= 0 && neighbours_[walk.tet][k] == walk.from)) continue;
+    const double to = std::max(0.0, -here[k] / slope[k]);
+    if (to >= length_left) continue;
+    length_left = to;
+    out = k;
+  }
+  Deposit deposit{walk.tet, {}, {}};
+  if (out < 0) length_left = 0.0;
+  double most_left = 0.0;
+  for (int c = 0; c < 3; ++c) {
+    const Optics& optics = optics_[walk.tet];
+    const double t = length_left / (3.0 * optics.diffusion[c]);
+    const double scattered = walk.left[c] * -std::expm1(-t);
+    const double albedo = 1.0 - 3.0 * optics.diffusion[c] * optics.absorption[c];
+    deposit.power[c] = walk.beam.power[c] * albedo * scattered;
+    const double at = t > 0.0 ? length_left * centroid(t) : 0.0;
+    for (int k = 0; k < 4; ++k)
+      deposit.corners[c][k] = std::clamp(here[k] + at * slope[k], 0.0, 1.0);
+    walk.left[c] -= scattered;
+    if (walk.beam.power[c] > 0.0) most_left = std::max(most_left, walk.left[c]);
+  }
+  walk.place = walk.place + walk.beam.along * length_left;
+  const bool goes_on = out >= 0 && most_left > kSpent && ++walk.steps < kMostSteps;
+  walk.from = walk.tet;
+  walk.tet = goes_on ? neighbours_[walk.tet][out] : -1;
+  return deposit;
+}
+
+}  // namespace opaline::render
