@@ -40,6 +40,7 @@ class SessionDirectory {
   std::filesystem::path lock() const { return path_ / "lock"; }
   std::filesystem::path control_socket() const { return path_ / "control.sock"; }
   std::filesystem::path frames() const { return path_ / "frames"; }
+  std::filesystem::path calibration() const { return path_ / "calibration" / "calibration.json"; }
   std::filesystem::path hdr() const { return path_ / "hdr"; }
   std::filesystem::path checkpoint() const { return path_ / "checkpoint"; }
   std::filesystem::path material() const { return path_ / "material.vdb"; }

@@ -72,7 +72,7 @@ function(opaline_test path)
     set(A_TIMEOUT 300)
   endif()
   set_tests_properties(${name} PROPERTIES LABELS "${A_LABELS}" TIMEOUT ${A_TIMEOUT}
-    ENVIRONMENT "OPALINE_SOURCE_DIR=${CMAKE_SOURCE_DIR};OPALINE_BIN_DIR=${CMAKE_BINARY_DIR}/bin;${A_ENVIRONMENT}")
+    ENVIRONMENT "OPALINE_SOURCE_DIR=${CMAKE_SOURCE_DIR};OPALINE_CALIBRATIONS=${CMAKE_BINARY_DIR}/tests/no-calibrations;OPALINE_BIN_DIR=${CMAKE_BINARY_DIR}/bin;${A_ENVIRONMENT}")
 endfunction()
 
 # opaline_shaders(LIBRARY a.comp b.frag ...) compiles each to SPIR-V in the build tree and embeds it as

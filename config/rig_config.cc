@@ -280,6 +280,9 @@ void visit_calibrated_camera(Fields& fields, capture::CameraCalibration& c, bool
 
 void visit_calibration(Fields& fields, RigConfig& rig) {
   const bool simulated = rig.camera == Driver::kSim;
+  fields.one_of({"use", "what \"opaline calibrate\" measured last, or what follows"},
+                rig.calibration_use,
+                kCalibrationUseNames);
   fields.table({"camera", "The camera."}, [&](Fields& f) {
     const capture::CameraCalibration& c = rig.calibration.camera;
     const sim::CameraOptics& real = rig.sim.rig.camera;

@@ -30,6 +30,13 @@ enum class RigPlace : std::uint8_t {
 };
 inline constexpr std::array<std::string_view, 2> kRigPlaceNames{"inside", "process"};
 
+/// Which calibration of the devices sessions use.
+enum class CalibrationUse : std::uint8_t {
+  kActive,  ///< the station's active one ("opaline calibrate"), where there is one
+  kGiven,   ///< what the rig file says
+};
+inline constexpr std::array<std::string_view, 2> kCalibrationUseNames{"active", "given"};
+
 /// The simulated station: its sample, how light travels in it, and its devices.
 struct SimConfig {
   RigPlace run = RigPlace::kInside;
@@ -52,7 +59,8 @@ struct RigConfig {
   LightStageConfig light_stage;         ///< in place of the projector, if it has a driver
   std::filesystem::path replay_folder;  ///< photographs and their index
   SimConfig sim;
-  /// What the capture believes of the devices. On a simulated station the truth, unless given.
+  CalibrationUse calibration_use = CalibrationUse::kActive;
+  /// What is believed of the devices that no active calibration has measured. On a simulated station the truth, unless given.
   capture::StationCalibration calibration;
 
   bool has_stage() const { return light_stage.driver != StageDriver::kNone; }

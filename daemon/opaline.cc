@@ -11,6 +11,8 @@
 #include "base/files.h"
 #include "base/log.h"
 #include "config/session_config.h"
+#include "daemon/cli/become.h"
+#include "daemon/cli/calibration.h"
 #include "daemon/cli/daemon_client.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/render.h"
@@ -32,6 +34,12 @@ using namespace opaline::daemon;  // NOLINT(google-build-using-namespace)
 
 constexpr int kLeft = 5;  // no longer followed, and not over; beside those of ProgramExit
 
+struct CalibrateWish {
+  std::string rig;
+  std::string step;
+  bool resume = false;
+};
+
 struct Arguments {
   DaemonAddress daemon;
   std::filesystem::path config;
@@ -43,6 +51,9 @@ struct Arguments {
   std::filesystem::path programs = program_directory();
   bool local = false;
   TradeoffWish tradeoff;
+  CalibrateWish calibrate;
+  CalibrationPlace calibrations{default_calibrations(), {}};
+  std::vector<int> versions;
   RenderWish render;
 };
 
@@ -295,6 +306,83 @@ void declare_render(CLI::App& app, Arguments& arguments, int& status_code) {
   sub->callback([&] { status_code = report(become_render(arguments.programs, wish)); });
 }
 
+Error become_calibrate(const Arguments& arguments) {
+  const CalibrateWish& wish = arguments.calibrate;
+  std::vector<std::string> words{"--calibrations", arguments.calibrations.root.string()};
+  if (!wish.step.empty()) words.insert(words.end(), {"--step", wish.step});
+  if (wish.resume) words.emplace_back("--resume");
+  words.insert(words.end(), {"--", wish.rig});
+  return become(arguments.programs, "opaline-calibrate", words);
+}
+
+void declare_place(CLI::App& command, Arguments& arguments) {
+  command
+      .add_option("--calibrations", arguments.calibrations.root, "Directory of all calibrations")
+      ->capture_default_str();
+}
+
+void declare_calibrate(CLI::App& app, Arguments& arguments, int& status_code) {
+  CalibrateWish& wish = arguments.calibrate;
+  CLI::App* sub = app.add_subcommand(
+      "calibrate", "Let a station measure its camera and projector before it measures a sample");
+  sub->add_option("RIG", wish.rig, "rig.toml")->required();
+  sub->add_option(
+      "--step", wish.step, "One step only: warm_up, black_level, linearity, radiometric, check");
+  sub->add_flag("--resume", wish.resume, "Go on with the newest unfinished one");
+  declare_place(*sub, arguments);
+  sub->footer(
+      "Each step has gates; the first that fails ends it and names what to mend. What is measured: "
+      "docs/calibration.md\nExit status: 0 done, 1 refused or failed, 2 bad input, 3 stopped, 4 "
+      "station busy\n\nExamples:\n"
+      "  opaline calibrate config/sim-rig.toml\n"
+      "  opaline calibrate --resume config/sim-rig.toml\n"
+      "  opaline calibrate --step black_level config/sim-rig.toml");
+  sub->callback([&] { status_code = report(become_calibrate(arguments)); });
+}
+
+int report(const Result<void>& done) {
+  return done ? status_of(ProgramExit::kDone) : report(done.error());
+}
+
+void declare_calibration(CLI::App& app, Arguments& arguments, int& status_code) {
+  CLI::App* group =
+      app.add_subcommand("calibration", "The calibrations of a station, and which one is used");
+  group->require_subcommand(1);
+  group->fallthrough();
+  declare_place(*group, arguments);
+  group->add_option(
+      "--station", arguments.calibrations.station, "Where there are several: [station] name");
+  const auto add = [&](const char* name, const char* help, std::function<Result<void>()> action) {
+    CLI::App* sub = group->add_subcommand(name, help);
+    sub->callback([&status_code, action = std::move(action)] { status_code = report(action()); });
+    return sub;
+  };
+  const CalibrationPlace& place = arguments.calibrations;
+  add("list", "All, with the one in use", [&] { return list_calibrations(place); });
+  add("show",
+      "One with its steps, gates and figures",
+      [&] {
+        return show_calibration(place, arguments.versions.empty() ? 0 : arguments.versions[0]);
+      })
+      ->add_option("VERSION", arguments.versions, "Default: the active one")
+      ->expected(0, 1);
+  add("activate",
+      "Use this one from now on, also an older one",
+      [&] { return activate_calibration(place, arguments.versions[0]); })
+      ->add_option("VERSION", arguments.versions, "As \"opaline calibration list\" has it")
+      ->required()
+      ->expected(1);
+  add("diff",
+      "What changed between two",
+      [&] { return diff_calibrations(place, arguments.versions[0], arguments.versions[1]); })
+      ->add_option("BEFORE AFTER", arguments.versions, "Two versions")
+      ->required()
+      ->expected(2);
+  group->footer(
+      "Examples:\n  opaline calibration list\n  opaline calibration show 3\n  opaline calibration "
+      "activate 2      roll back\n  opaline calibration diff 2 3");
+}
+
 void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   app.description(
       "Captures translucent materials: one configuration in, a material and its report out.");
@@ -323,6 +411,8 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   declare_questions(app, arguments, status_code);
   declare_deeds(app, arguments, status_code);
   declare_tradeoff(app, arguments, status_code);
+  declare_calibrate(app, arguments, status_code);
+  declare_calibration(app, arguments, status_code);
   declare_render(app, arguments, status_code);
 }
 

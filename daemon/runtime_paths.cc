@@ -18,6 +18,14 @@ std::string variable(const char* name) {
   return value == nullptr ? "" : value;
 }
 
+fs::path user_data(const char* named_by, const char* what) {
+  if (const std::string named = variable(named_by); !named.empty()) return named;
+  if (const std::string data = variable("XDG_DATA_HOME"); !data.empty())
+    return fs::path(data) / "opaline" / what;
+  const std::string home = variable("HOME");
+  return fs::path(home.empty() ? "." : home) / ".local" / "share" / "opaline" / what;
+}
+
 }  // namespace
 
 Result<fs::path> runtime_directory() {
@@ -42,13 +50,8 @@ Result<fs::path> default_socket() {
   return *directory / "opalined.sock";
 }
 
-fs::path default_sessions() {
-  if (const std::string named = variable("OPALINE_SESSIONS"); !named.empty()) return named;
-  if (const std::string data = variable("XDG_DATA_HOME"); !data.empty()) {
-    return fs::path(data) / "opaline" / "sessions";
-  }
-  const std::string home = variable("HOME");
-  return fs::path(home.empty() ? "." : home) / ".local" / "share" / "opaline" / "sessions";
-}
+fs::path default_sessions() { return user_data("OPALINE_SESSIONS", "sessions"); }
+
+fs::path default_calibrations() { return user_data("OPALINE_CALIBRATIONS", "calibrations"); }
 
 }  // namespace opaline::daemon

@@ -17,4 +17,8 @@ Result<std::filesystem::path> default_socket();
 /// ~/.local/share/opaline/sessions.
 std::filesystem::path default_sessions();
 
+/// Where the calibrations of all stations lie unless told otherwise: $OPALINE_CALIBRATIONS, $XDG_DATA_HOME/opaline/calibrations
+/// or ~/.local/share/opaline/calibrations.
+std::filesystem::path default_calibrations();
+
 }  // namespace opaline::daemon

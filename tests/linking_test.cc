@@ -47,6 +47,7 @@ std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
 const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline", {"libcurl"}},
     {"opalined", {"libsqlite3"}},
+    {"opaline-calibrate", join({kPictures, kUsb})},
     {"opaline-capture", join({kPictures, kUsb})},
     {"opaline-guardian", kUsb},
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "daemon/cli/successor.h"
+#include "daemon/cli/become.h"
 
 namespace opaline::daemon {
 
@@ -13,7 +13,7 @@ Error become_tradeoff(const std::filesystem::path& programs, const TradeoffWish&
   if (!wish.out.empty()) words.insert(words.end(), {"--out", wish.out});
   if (wish.quick) words.emplace_back("--quick");
   words.insert(words.end(), {"--", wish.directory});
-  return become(programs / "opaline-tradeoff", std::move(words));
+  return become(programs, "opaline-tradeoff", words);
 }
 
 }  // namespace opaline::daemon

@@ -1,4 +1,5 @@
 #include <stop_token>
+#include <utility>
 
 #include "base/log.h"
 #include "capture/gradient_sequence.h"
@@ -8,6 +9,8 @@
 #include "daemon/jobs/guardian.h"
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/station_lock.h"
+#include "daemon/runtime_paths.h"
+#include "daemon/session_calibration.h"
 
 // opaline-capture SESSION_DIR: shows the session's lights, takes their frames, and writes frames/, hdr/ and the dataset.
 
@@ -53,7 +56,7 @@ Result<void> capture_sphere(const opaline::config::SessionConfig& config,
 }
 
 Result<void> capture(daemon::JobContext& context) {
-  const auto config = opaline::config::load_resolved(context.session);
+  auto config = opaline::config::load_resolved(context.session);
   if (!config) return config.error();
   const auto station = daemon::lock_station(config->rig.station);
   if (!station) return station.error();
@@ -70,6 +73,17 @@ Result<void> capture(daemon::JobContext& context) {
   const std::stop_callback asked(context.stop, request);
   const std::stop_callback unguarded((*guardian)->death(), request);
   const bool in_sphere = config->kind == opaline::config::SessionKind::kLedSphere;
+  if (!in_sphere) {
+    auto calibration = daemon::session_calibration(context.session,
+                                                   config->rig,
+                                                   daemon::default_calibrations(),
+                                                   (*devices)->station(),
+                                                   context.files,
+                                                   context.events,
+                                                   stop.get_token());
+    if (!calibration) return calibration.error();
+    config->rig.calibration = *std::move(calibration);
+  }
   const auto done = (in_sphere ? capture_sphere : capture_block)(
       *config, (*devices)->station(), {directory, context.files, context.events}, stop.get_token());
   if (!done && (*guardian)->death().stop_requested()) {

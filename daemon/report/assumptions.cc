@@ -25,6 +25,17 @@ std::string source(const reconstruct::InverseOptions& options) {
              : "surface: diffuse light enters at the boundary";
 }
 
+std::string calibration(const ReportData& data) {
+  if (data.facts.calibration.empty()) {
+    return data.config.rig.is_simulated() ? "of a simulated station, read from the rig file"
+                                          : "read from the rig file, not measured in this session";
+  }
+  std::string text = "measured: " + data.facts.calibration;
+  for (const std::string& warning : data.facts.calibration_warnings)
+    text += "; DOUBTFUL: " + warning;
+  return text;
+}
+
 std::string left_out(const ReportData& data) {
   if (data.dataset.lit_face != data.dataset.seen_face) return "nothing: another face is seen";
   return fmt::format("{:.2f} mm: {} transport mean free paths",
@@ -55,9 +66,7 @@ std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& d
                    options.regularizer == reconstruct::Smoothness::kH1 ? "squared gradients (H1)"
                                                                        : "total variation",
                    options.regularization)},
-      {"Calibration",
-       data.config.rig.is_simulated() ? "of a simulated station, read from the rig file"
-                                      : "read from the rig file, not measured in this session"},
+      {"Calibration", calibration(data)},
       {"Unscattered light", "left out: it is not part of the diffuse light"},
   };
 }

@@ -16,6 +16,9 @@ void count(const Event& event, SessionFacts& facts) {
   if (event.type == "job.started" && ++facts.runs == 1) facts.begun = event.time;
   if (event.type == "region.captured") ++facts.regions_captured;
   if (event.type == "region.retaken") ++facts.regions_retaken;
+  if (event.type == "calibration.used") facts.calibration = text_in(event, "message");
+  if (event.type == "calibration.warning")
+    facts.calibration_warnings.push_back(text_in(event, "message"));
   if (event.type == "region.unusable") {
     facts.unusable.push_back(text_in(event, "region") + ": " + text_in(event, "message"));
   }

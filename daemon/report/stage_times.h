@@ -17,7 +17,9 @@ struct SessionFacts {
   int runs = 0;                                 ///< of jobs, restarts included
   int regions_captured = 0;
   int regions_retaken = 0;
-  std::vector<std::string> unusable;  ///< lights that could not be used, and why
+  std::string calibration;                        ///< that was used; empty: the rig file's
+  std::vector<std::string> calibration_warnings;  ///< what the station said against it
+  std::vector<std::string> unusable;              ///< lights that could not be used, and why
 
   double total_seconds() const;
 };
