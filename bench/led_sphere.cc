@@ -20,8 +20,10 @@
 #include "bench/stopwatch.h"
 #include "reconstruct/diffusion/fresnel.h"
 #include "reconstruct/spherical_gradient/ball_table.h"
+#include "reconstruct/spherical_gradient/beam_fit.h"
 #include "reconstruct/spherical_gradient/curvature_ratio.h"
 #include "reconstruct/spherical_gradient/scattering_maps.h"
+#include "sim/ball_beam.h"
 #include "sim/ball_pictures.h"
 
 namespace opaline::bench {
@@ -105,6 +107,32 @@ void measure_materials(ThreadTeam& team, std::int64_t paths) {
   }
   print_figure("led.diffusion_error_mc", "worst", worst_diffusion, "1");
   print_figure("led.albedo_error_mc", "worst", worst_albedo, "1");
+}
+
+/// The reference method of the paper's Table 1 on the same balls: a dipole fitted to what a thin beam makes leave, from 2 mean free paths to 8 l_d away.
+void measure_beams(ThreadTeam& team, std::int64_t paths) {
+  for (const Material& m : kMaterials) {
+    const double g = decay(m.reduced_albedo);
+    const double radius = 1.0 / (g * m.curvature);  // mean free paths
+    const double reach = std::min(8.0 / g, 1.2 * radius);
+    const auto beam =
+        sim::trace_beam({m.reduced_albedo, radius, kIor}, reach, 60, paths, 21, team, {});
+    if (!beam) continue;
+    std::vector<double> distance;
+    std::vector<double> exitance;
+    std::vector<double> weight;
+    for (std::size_t n = 0; n < beam->distance.size(); ++n) {
+      if (beam->distance[n] < 2.0 || !(beam->exitance[n] > 0.0)) continue;
+      distance.push_back(beam->distance[n]);
+      exitance.push_back(beam->exitance[n] / (1.0 - std::pow((kIor - 1.0) / (kIor + 1.0), 2)));
+      const double noise = beam->deviation[n] / beam->exitance[n];
+      weight.push_back(1.0 / (noise * noise + 1e-4));
+    }
+    const auto found = reconstruct::fit_beam(distance, exitance, weight, kIor);
+    if (!found) continue;
+    print_figure("led.beam_diffusion_over_truth", m.name, 3.0 * found->diffusion, "1");
+    print_figure("led.beam_translucency_over_truth", m.name, found->translucency * g, "1");
+  }
 }
 
 reconstruct::GradientPictures pictures_of(const sim::BallScene& scene,
@@ -333,6 +361,7 @@ int main(int argc, char** argv) try {
   if (tradeoff) return bench::measure_tradeoff(std::min<std::int64_t>(paths, 500'000), plot, team);
   bench::measure_formulas();
   bench::measure_materials(team, paths);
+  bench::measure_beams(team, std::min<std::int64_t>(paths, 500'000));
   bench::measure_noise(team, paths);
   bench::measure_stage(team, std::min<std::int64_t>(paths, 1'000'000));
   bench::measure_extremes(team, std::min<std::int64_t>(paths, 300'000));

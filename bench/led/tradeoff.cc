@@ -19,7 +19,6 @@
 namespace opaline::bench {
 namespace {
 
-using reconstruct::BallTable;
 using reconstruct::CurvatureRatio;
 using reconstruct::StagePictures;
 

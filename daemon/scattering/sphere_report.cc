@@ -48,9 +48,7 @@ constexpr std::array<View, 4> kViews{
     View{"diffusion", "Diffusion coefficient D, mm", &ScatteringMaps::diffusion},
     View{"translucency", "Translucency l_d, mm", &ScatteringMaps::translucency},
     View{"reduced_albedo", "Reduced albedo α'", &ScatteringMaps::reduced_albedo},
-    View{"diffusion_log_sd",
-         "Standard deviation of ln D (0.1: about 10 %)",
-         &ScatteringMaps::log_diffusion_deviation}};
+    View{"diffusion_log_sd", "Deviation of ln D (σ)", &ScatteringMaps::log_diffusion_deviation}};
 
 struct Span {
   double low = 0.0;
@@ -177,15 +175,17 @@ MapPlot SphereReport::map_plot(const View& view) const {
   plot.panel_height = 240 * maps_.channels[0].height / maps_.channels[0].width;
   plot.scale_label = view.title;
   const Span span = span_of(view);
-  plot.lowest = span.low;
-  plot.highest = span.high;
+  const double margin = 0.002 * (span.high - span.low);  // what is rounded must not fall out
+  plot.lowest = span.low - margin;
+  plot.highest = span.high + margin;
   const double pixel = session_.record.pixel_mm * factor;
   for (std::size_t c = 0; c < 3; ++c) {
     const ScatteringMaps& m = maps_.channels[c];
     Image<float> panel(m.width / factor, m.height / factor, 1);
     for (int y = 0; y < panel.height(); ++y)
       for (int x = 0; x < panel.width(); ++x) {
-        const std::size_t at = static_cast<std::size_t>(y * factor) * m.width + x * factor;
+        const std::size_t at =
+            static_cast<std::size_t>(y) * factor * m.width + static_cast<std::size_t>(x) * factor;
         panel.at(x, panel.height() - 1 - y) = m.left_out[at] == LeftOut::kFound
                                                   ? std::clamp((m.*view.values)[at],
                                                                static_cast<float>(span.low),
