@@ -1,15 +1,17 @@
 #include "reconstruct/lbfgs_host_space.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 
 namespace opaline::reconstruct {
 namespace {
 
 double dot(std::span<const double> a, std::span<const double> b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  using Vector = Eigen::Map<const Eigen::VectorXd>;
+  const auto size = static_cast<Eigen::Index>(a.size());
+  return Vector(a.data(), size).dot(Vector(b.data(), size));
 }
 
 double largest(std::span<const double> a) {

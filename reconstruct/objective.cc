@@ -54,6 +54,7 @@ void Objective::start_afresh() {
   const auto count = static_cast<int>(problem_.illuminations.size());
   fluence_ = FieldBatch(problem_.block.cell_count(), count);
   adjoint_ = FieldBatch(problem_.block.cell_count(), count);
+  right_sides_ = FieldBatch(problem_.block.cell_count(), count);
 }
 
 Result<void> Objective::solve(const FieldBatch& b, FieldBatch& x, std::stop_token stop) {
@@ -67,8 +68,8 @@ Result<void> Objective::solve_forward(const ChannelCoefficients& coefficients,
                                       std::stop_token stop) {
   lit_.emplace(problem_, coefficients);
   if (auto prepared = solver_.prepare(lit_->medium); !prepared) return prepared;
-  const FieldBatch b = lit_->right_sides(problem_);
-  return solve(b, fluence_, stop);
+  lit_->right_sides(problem_, right_sides_);
+  return solve(right_sides_, fluence_, stop);
 }
 
 // Fills radiance_ from the fluence.
@@ -91,7 +92,8 @@ double Objective::residuals() {
 }
 
 Result<void> Objective::solve_adjoint(std::stop_token stop) {
-  return solve(adjoint_right_sides(problem_, *lit_, radiance_residual_), adjoint_, stop);
+  adjoint_right_sides(problem_, *lit_, radiance_residual_, right_sides_);
+  return solve(right_sides_, adjoint_, stop);
 }
 
 void Objective::regularize(const ChannelCoefficients& c,

@@ -83,6 +83,7 @@ class Objective {
   std::optional<LitMedium> lit_;  // the last one solved for
   diffusion::FieldBatch fluence_;
   diffusion::FieldBatch adjoint_;
+  diffusion::FieldBatch right_sides_;  // kept: fresh memory for it took a sixth of an evaluation
   std::vector<std::vector<double>> radiance_;  // per illumination
   RadianceResiduals radiance_residual_;
 };

@@ -33,13 +33,18 @@ LitMedium::LitMedium(const ChannelProblem& problem, const ChannelCoefficients& c
 }
 
 diffusion::FieldBatch LitMedium::right_sides(const ChannelProblem& problem) const {
-  const auto count = static_cast<int>(problem.illuminations.size());
-  diffusion::FieldBatch b(problem.block.cell_count(), count);
-  for (int m = 0; m < count; ++m) {
+  diffusion::FieldBatch b(problem.block.cell_count(),
+                          static_cast<int>(problem.illuminations.size()));
+  right_sides(problem, b);
+  return b;
+}
+
+void LitMedium::right_sides(const ChannelProblem& problem, diffusion::FieldBatch& b) const {
+  b.clear();
+  for (int m = 0; m < b.count; ++m) {
     light.deposit(problem.illuminations[static_cast<std::size_t>(m)].irradiance,
                   {b.field(m), b.cells});
   }
-  return b;
 }
 
 std::vector<std::vector<double>> radiance(const ChannelProblem& problem,
@@ -103,9 +108,18 @@ std::vector<std::vector<double>> radiance_change(const ChannelProblem& problem,
 diffusion::FieldBatch adjoint_right_sides(const ChannelProblem& problem,
                                           const LitMedium& lit,
                                           const RadianceResiduals& residuals) {
+  diffusion::FieldBatch b(problem.block.cell_count(), static_cast<int>(residuals.size()));
+  adjoint_right_sides(problem, lit, residuals, b);
+  return b;
+}
+
+void adjoint_right_sides(const ChannelProblem& problem,
+                         const LitMedium& lit,
+                         const RadianceResiduals& residuals,
+                         diffusion::FieldBatch& b) {
   const Block& block = problem.block;
   const double h = block.spacing()[axis_of(problem.seen_face)];
-  diffusion::FieldBatch b(block.cell_count(), static_cast<int>(residuals.size()));
+  b.clear();
   for (int m = 0; m < b.count; ++m) {
     const auto& residual = residuals[static_cast<std::size_t>(m)];
     if (lit.rays) {
@@ -117,7 +131,6 @@ diffusion::FieldBatch adjoint_right_sides(const ChannelProblem& problem,
       b.field(m)[cell] = by_flux[f] * problem.boundary.conductance(h, lit.medium.diffusion[cell]);
     });
   }
-  return b;
 }
 
 std::vector<double> by_net_flux(const ChannelProblem& problem, std::span<const double> residual) {

@@ -22,6 +22,7 @@ struct LitMedium {
 
   /// The right-hand sides of K phi_m = b_m.
   diffusion::FieldBatch right_sides(const ChannelProblem& problem) const;
+  void right_sides(const ChannelProblem& problem, diffusion::FieldBatch& b) const;
 };
 
 /// L per illumination on the seen face's cells, W/(mm^2 sr), from the fluence.
@@ -50,5 +51,9 @@ std::vector<double> by_ray(const ChannelProblem& problem, std::span<const double
 diffusion::FieldBatch adjoint_right_sides(const ChannelProblem& problem,
                                           const LitMedium& lit,
                                           const RadianceResiduals& residuals);
+void adjoint_right_sides(const ChannelProblem& problem,
+                         const LitMedium& lit,
+                         const RadianceResiduals& residuals,
+                         diffusion::FieldBatch& b);
 
 }  // namespace opaline::reconstruct

@@ -8,7 +8,9 @@ namespace opaline::reconstruct::diffusion {
 /// middle. t > 0.
 struct Centroid {
   explicit Centroid(double optical_length)
-      : t(optical_length), left(std::exp(-optical_length)), lost(-std::expm1(-optical_length)) {}
+      : t(optical_length),
+        left(std::exp(-optical_length)),
+        lost(optical_length > kThick ? 1.0 - left : -std::expm1(-optical_length)) {}
 
   double t;
   double left;  ///< e^(-t)
@@ -28,6 +30,7 @@ struct Centroid {
  private:
   /// Where the closed forms lose more to cancellation than the series to truncation.
   static constexpr double kSeriesBelow = 0.05;
+  static constexpr double kThick = 0.5;  ///< where 1 - e^(-t) loses nothing to cancellation
 };
 
 }  // namespace opaline::reconstruct::diffusion

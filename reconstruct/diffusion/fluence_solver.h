@@ -33,6 +33,7 @@ struct FieldBatch {
   FieldBatch() = default;
   FieldBatch(std::size_t cell_count, int field_count)
       : cells(cell_count), count(field_count), values(cell_count * field_count, 0.0) {}
+  void clear() { values.assign(values.size(), 0.0); }
   double* field(int m) { return values.data() + m * cells; }
   const double* field(int m) const { return values.data() + m * cells; }
 };
