@@ -84,7 +84,7 @@ Result<void> capture(daemon::JobContext& context) {
     if (!calibration) return calibration.error();
     config->rig.calibration = *std::move(calibration);
   }
-  const auto done = (in_sphere ? capture_sphere : capture_block)(
+  auto done = (in_sphere ? capture_sphere : capture_block)(
       *config, (*devices)->station(), {directory, context.files, context.events}, stop.get_token());
   if (!done && (*guardian)->death().stop_requested()) {
     return opaline::unavailable("the guardian died, and without one no light stays on");
