@@ -108,6 +108,7 @@ ChannelProblem coarsen(const ChannelProblem& problem, const Block& coarse) {
   out.block = coarse;
   const auto mean = [&](const auto& values, auto member) {
     std::vector<double> raster;
+    raster.reserve(values.size());
     for (const auto& value : values) raster.push_back(value.*member);
     return seen(cell_means, std::move(raster));
   };

@@ -282,8 +282,7 @@ Result<std::unique_ptr<Subsurface>> graph_subsurface(Graph graph,
   auto made = GraphSubsurface<T, Graph>::create(
       std::move(graph), std::move(mesh), material, boundary, team, report);
   if (made) {
-    static_cast<GraphSubsurface<T, Graph>&>(**made).take_surface(
-        std::move(surface), solid, options);
+    static_cast<GraphSubsurface<T, Graph>&>(**made).take_surface(surface, solid, options);
   }
   return made;
 }

@@ -59,7 +59,7 @@ name = "ball"
 
 class SphereSession : public ::testing::Test {
  protected:
-  ~SphereSession() override {
+  void TearDown() override {
     if (auto ended = sim::RigClient(socket_).end(); !ended) SUCCEED() << "there is none";
   }
   void make_session(int time_factor) {

@@ -81,7 +81,7 @@ TEST(CameraRays, FollowTheRefractedRayThroughASlopingField) {
             std::exp(a * (i + 0.5) * h + b * (j + 0.5) * h - c * depth_of(block, k));
   const CameraRay ray = camera_ray(kIor, 0.5, 0.3);
   EXPECT_NEAR(1.0 / ray.stretch, refracted_cosine(std::sqrt(1.0 - 0.34), kIor), 1e-12);
-  const std::vector<CameraRay> rays(60 * 60, ray);
+  const std::vector<CameraRay> rays(block.face_cell_count(Face::kZMax), ray);
   // A source that makes phi_s the field's value at the surface, without which phi_s would be 2 A J_n.
   const double share = 2.0 * boundary.a * boundary.conductance(h, medium.diffusion.front());
   std::vector<double> source(rays.size());
