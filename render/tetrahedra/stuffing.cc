@@ -71,7 +71,10 @@ double spacing_for(double volume_mm3, double tets) { return std::cbrt(12.0 * vol
 double estimate_volume(const SignedDistance& solid, int points) {
   const Box box = solid.bounds();
   const Vec3 size = box.size();
-  const double step = std::cbrt(std::max(size.x * size.y * size.z, 1e-300) / points);
+  const double thinnest = std::max({size.x, size.y, size.z}) / points;  // of a sheet or a needle
+  if (!(thinnest > 0.0)) return 0.0;
+  const double step = std::cbrt(std::max(size.x, thinnest) * std::max(size.y, thinnest) *
+                                std::max(size.z, thinnest) / points);
   const auto count = [step](double length) { return std::max(1, static_cast<int>(length / step)); };
   const int nx = count(size.x);
   const int ny = count(size.y);
