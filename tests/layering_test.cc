@@ -70,6 +70,8 @@ const std::map<std::string, std::vector<std::string>> kOnlyUsers{
     {"toml++/", {"config", "drivers"}},
     {"spdlog/", {"base"}},
     {"Eigen/", {"reconstruct", "calibration", "tests", "bench"}},
+    {"opencv2/", {"calibration"}},
+    {"ceres/", {"calibration"}},
     {"hwy/", {"reconstruct", "sim"}},
     {"CLI/", {"daemon", "bench"}},
     {"Imath/", {"base/io"}},

@@ -37,6 +37,8 @@ FormatName name_of(ImageFormat format) {
       return {"tiff", "memory.tif", "TIFF"};
     case ImageFormat::kExr:
       return {"openexr", "memory.exr", "EXR"};
+    case ImageFormat::kJpeg:
+      return {"jpeg", "memory.jpg", "JPEG"};
   }
   return {"openexr", "memory.exr", "EXR"};
 }
@@ -143,6 +145,7 @@ std::optional<ImageFormat> detect(std::span<const std::byte> bytes) {
   if (starts_with(bytes, "\x89PNG\r\n\x1a\n"sv)) return ImageFormat::kPng;
   if (starts_with(bytes, "II*\0"sv) || starts_with(bytes, "MM\0*"sv)) return ImageFormat::kTiff;
   if (starts_with(bytes, "\x76\x2f\x31\x01"sv)) return ImageFormat::kExr;
+  if (starts_with(bytes, "\xff\xd8\xff"sv)) return ImageFormat::kJpeg;
   return std::nullopt;
 }
 
@@ -228,6 +231,7 @@ Result<ImageFile> decode(std::span<const std::byte> bytes,
 }  // namespace
 
 Result<std::vector<std::byte>> encode_image(const ImageFile& image, ImageFormat format) {
+  if (format == ImageFormat::kJpeg) return invalid_argument("JPEG is read only: it loses");
   try {
     use_calling_thread();
     return std::visit([&](const auto& pixels) { return encode(image, pixels, format); },
@@ -243,7 +247,7 @@ Result<ImageFile> decode_image(std::span<const std::byte> bytes, const ImageLimi
         fmt::format("{} bytes; expected at most {}", bytes.size(), limits.bytes));
   }
   const std::optional<ImageFormat> format = detect(bytes);
-  if (!format) return invalid_argument("not a PNG, TIFF or EXR file");
+  if (!format) return invalid_argument("not a PNG, TIFF, EXR or JPEG file");
   try {
     use_calling_thread();
     return decode(bytes, *format, limits);

@@ -16,12 +16,13 @@
 /// Threads: all functions may be called from any thread.
 namespace opaline {
 
-enum class ImageFormat : std::uint8_t { kPng, kTiff, kExr };
+enum class ImageFormat : std::uint8_t { kPng, kTiff, kExr, kJpeg };  ///< kJpeg: for reading only
 
 /// What an image file holds: pixels, the name of each channel, and text.
 ///
 /// PNG and TIFF take 8- and 16-bit samples and 1, 2, 3 or 4 channels, whose names they do not keep;
 /// EXR takes float samples and any number of uniquely named channels, and keeps NaN and infinity.
+/// JPEG is read and not written.
 /// Samples are stored as they are: no gamma, no colour conversion, alpha not multiplied in.
 struct ImageFile {
   std::variant<Image<std::uint8_t>, Image<std::uint16_t>, Image<float>> pixels;
@@ -41,7 +42,7 @@ struct ImageLimits {
 /// format does not take, or wrong channel names.
 Result<std::vector<std::byte>> encode_image(const ImageFile& image, ImageFormat format);
 
-/// Reads PNG, TIFF (8-, 16-bit, float) or EXR (half, float), told apart by their first bytes. EXR
+/// Reads PNG, TIFF (8-, 16-bit, float), EXR (half, float) or JPEG (8-bit), told apart by their first bytes. EXR
 /// channels come in the order R G B A, then the others as the file has them: use select_channels()
 /// to have them by name. Errors: kInvalidArgument for a truncated, damaged, too large or foreign
 /// file, saying which.

@@ -1,0 +1,95 @@
+#include "calibration/lens_fit.h"
+
+#include <algorithm>
+
+#include "calibration/kept_views.h"
+#include "calibration/zhang.h"
+
+namespace opaline::calibration {
+namespace {
+
+constexpr int kRounds = 10;
+constexpr int kFieldsX = 8;
+constexpr int kFieldsY = 6;
+
+double coverage_of(const Bundle& bundle) {
+  const CameraModel& lens = bundle.lenses.front();
+  std::vector<bool> seen(static_cast<std::size_t>(kFieldsX) * kFieldsY, false);
+  for (const Sighting& s : bundle.sightings) {
+    const int x = std::clamp(static_cast<int>(s.pixel.x / lens.width * kFieldsX), 0, kFieldsX - 1);
+    const int y = std::clamp(static_cast<int>(s.pixel.y / lens.height * kFieldsY), 0, kFieldsY - 1);
+    seen[static_cast<std::size_t>(y) * kFieldsX + static_cast<std::size_t>(x)] = true;
+  }
+  return static_cast<double>(std::ranges::count(seen, true)) / static_cast<double>(seen.size());
+}
+
+void begin(
+    LensFit& fit, int width, int height, const Board& board, std::span<const BoardView> views) {
+  std::vector<Homography> planes;
+  std::vector<std::size_t> of;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (!fit.views[v].kept()) continue;
+    const auto plane = board_homography(board, views[v]);
+    if (plane) {
+      planes.push_back(*plane);
+      of.push_back(v);
+    } else {
+      fit.views[v].reason = "its corners lie on a line";
+    }
+  }
+  fit.lens = initial_lens(width, height, planes);
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    fit.views[of[i]].camera_from_board = initial_pose(fit.lens, planes[i]);
+}
+
+void take_over(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
+  fit.lens = kept.bundle.lenses.front();
+  for (std::size_t v = 0; v < kept.view.size(); ++v) {
+    ViewFit& view = fit.views[kept.view[v]];
+    view.camera_from_board = kept.bundle.camera_from_board[v];
+    view.rms_px = summary.view_rms_px[0][v];
+  }
+}
+
+void conclude(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
+  take_over(fit, kept, summary);
+  fit.deviation = summary.deviation.front();
+  fit.rms_px = summary.rms_px.front();
+  fit.worst_view_px = std::ranges::max(summary.view_rms_px.front());
+  fit.median_view_px = median_of(summary.view_rms_px.front());
+  fit.coverage = coverage_of(kept.bundle);
+  fit.corners = static_cast<int>(kept.bundle.sightings.size());
+}
+
+}  // namespace
+
+int LensFit::kept() const { return count_kept(views); }
+
+Result<LensFit> fit_lens(int width,
+                         int height,
+                         const Board& board,
+                         std::span<const BoardView> views,
+                         const LensFitOptions& options,
+                         std::stop_token stop) {
+  LensFit fit;
+  fit.views = looked_at(views, options);
+  begin(fit, width, height, board, views);
+  auto counts = all_count(views);
+  for (int round = 0; round < kRounds; ++round) {
+    if (auto done = enough(fit.views, options.fewest_views); !done) return done.error();
+    Kept kept = kept_of(fit.lens, board, views, fit.views, counts);
+    const auto robust = adjust_robustly(kept.bundle, stop);
+    if (!robust) return robust.error();
+    take_over(fit, kept, *robust);
+    if (leave_out(fit.views, options, "does not fit")) continue;
+    fit.outliers = drop_outliers(kept, *robust, 0, options.outlier, counts);
+    break;
+  }
+  Kept kept = kept_of(fit.lens, board, views, fit.views, counts);
+  const auto last = adjust(kept.bundle, {}, stop);
+  if (!last) return last.error();
+  conclude(fit, kept, *last);
+  return fit;
+}
+
+}  // namespace opaline::calibration
