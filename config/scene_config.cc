@@ -20,6 +20,11 @@ constexpr std::array<std::string_view, 3> kSpeculars{"none", "cook_torrance", "w
 constexpr std::array<std::string_view, 2> kEntries{"collimated", "diffuse"};
 constexpr std::array<std::string_view, 3> kMethods{"graph", "elements", "polygrid"};
 constexpr std::array<std::string_view, 3> kBoundaries{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 4> kOperations{"paint", "scale", "add", "set"};
+constexpr std::array<std::string_view, 2> kQuantities{"absorption", "reduced_scattering"};
+constexpr std::array<std::string_view, 3> kReaches{"ball", "depth", "through"};
+constexpr std::array<std::string_view, 3> kDeforms{"none", "cage", "bones"};
+constexpr std::array<std::string_view, 2> kInverted{"refuse", "mark"};
 constexpr double kFarthest = 1e6;  // mm
 
 void vector(Fields& fields, const Key& key, Vec3& value, Unit unit) {
@@ -173,6 +178,68 @@ void visit_pattern(Fields& fields, PatternOptions& p) {
                "expected more than 0: logarithms are mixed");
 }
 
+void visit_edit(Fields& fields, EditOptions& e) {
+  fields.one_of({"operation", ""}, e.operation, kOperations);
+  fields.one_of({"quantity", ""}, e.quantity, kQuantities);
+  fields.numbers({"value", "red, green, blue: 1/mm, or factors of scale", true},
+                 e.value,
+                 Range::between(-1e6, 1e6));
+  fields.number({"strength", ""}, e.strength, Range::between(0, 1));
+  fields.one_of({"reach", "within a ball; some depth below the surface; all along an axis"},
+                e.reach,
+                kReaches);
+  vector(fields, {"centre", "in the object's frame, at rest"}, e.centre, Unit::kLength);
+  vector(fields,
+         {"direction", "of the axis through the centre, and in which a mask is projected"},
+         e.direction,
+         Unit::kPlain);
+  fields.length_mm({"radius", ""}, e.radius_mm);
+  fields.number({"softness", "share of the radius over which the brush falls off"},
+                e.softness,
+                Range::between(0, 1));
+  fields.length_mm({"depth", "below the surface"}, e.depth_mm, Range::at_least(0));
+  fields.length_mm({"thickness", "of what a depth means"}, e.thickness_mm);
+  fields.path({"mask", "picture across the brush: white takes all, black nothing"}, e.mask);
+  const auto valid = validate(e);
+  fields.check(valid.has_value(), "value", valid ? "" : valid.error().message);
+}
+
+void visit_handle(Fields& fields, CageHandle& h) {
+  fields.wholes({"point", "along x, y, z, counted from 0; -1: all of them", true},
+                h.point,
+                Range::between(-1, 7));
+  vector(fields, {"move", "", true}, h.move, Unit::kLength);
+}
+
+void visit_bone(Fields& fields, Bone& b) {
+  fields.text({"name", ""}, b.name);
+  fields.text({"parent", "the bone before it that carries it"}, b.parent);
+  vector(fields, {"head", "", true}, b.head, Unit::kLength);
+  vector(fields, {"tail", "", true}, b.tail, Unit::kLength);
+  fields.numbers({"rotation", "about the head: about x, then y, then z"},
+                 b.rotation_degrees,
+                 Range::between(-720, 720),
+                 Unit::kAngle);
+  vector(fields, {"move", "after the rotation"}, b.move, Unit::kLength);
+}
+
+void visit_deform(Fields& fields, DeformOptions& d) {
+  fields.one_of({"kind", ""}, d.kind, kDeforms);
+  if (d.kind == DeformOptions::Kind::kNone) return;
+  fields.one_of({"inverted", "what becomes of a shape that is turned inside out somewhere"},
+                d.inverted,
+                kInverted);
+  fields.number({"amount", "share of every move and angle"}, d.amount, Range::between(-10, 10));
+  if (d.kind == DeformOptions::Kind::kCage) {
+    fields.wholes({"points", "of the cage along x, y, z"}, d.points, Range::between(2, 8));
+    fields.list({"handles", "Its control points that move.", true}, d.handles, visit_handle);
+  } else {
+    fields.list({"bones", "Each place goes with the bones near it.", true}, d.bones, visit_bone);
+  }
+  const auto valid = validate(d);
+  fields.check(valid.has_value(), "kind", valid ? "" : valid.error().message);
+}
+
 void visit_material(Fields& fields, TranslucentOptions& m) {
   fields.path({"file", "a material.vdb, from a session or painted"}, m.file);
   if (!m.file.empty()) {
@@ -189,6 +256,9 @@ void visit_material(Fields& fields, TranslucentOptions& m) {
     visit_coefficients(fields, m.absorption, m.reduced_scattering);
     fields.number(
         {"ior", "relative refractive index; a file brings its own"}, m.ior, Range::between(1, 3));
+    fields.whole({"edit_cells", "along the longest side of the block that edits go into"},
+                 m.edit_cells,
+                 Range::between(1, 1024));
     fields.table({"pattern", "Instead of the same everywhere."},
                  [&](Fields& f) { visit_pattern(f, m.pattern); });
     fields.check(
@@ -217,7 +287,10 @@ void visit_object(Fields& fields, ObjectOptions& o) {
   } else {
     fields.table({"material", "What it is made of."},
                  [&](Fields& f) { visit_material(f, o.material); });
+    fields.list({"edits", "Strokes in the material, one after another."}, o.edits, visit_edit);
   }
+  fields.table({"deform", "How it is bent, in its own frame."},
+               [&](Fields& f) { visit_deform(f, o.deform); });
 }
 
 void visit_scene(Fields& fields, Scene& scene) {
@@ -253,12 +326,25 @@ Scene example() {
   body.shape.size_mm = 20.0;
   body.material.pattern.kind = PatternOptions::Kind::kVeins;
   body.material.pattern.absorption = {0.05, 0.06, 0.08};
+  body.edits = {{.operation = EditOptions::Operation::kScale,
+                 .value = {1.0, 4.0, 8.0},
+                 .reach = EditOptions::Reach::kDepth,
+                 .centre = {7.5, 0.0, 0.0}}};
+  body.deform.kind = DeformOptions::Kind::kCage;
+  body.deform.handles = {{.point = {-1, -1, 2}, .move = {0.0, 3.0, 0.0}}};
   ObjectOptions floor;
   floor.name = "floor";
   floor.kind = ObjectOptions::Kind::kOpaque;
   floor.shape.name = "plane";
   floor.shape.size_mm = 100.0;
   floor.shape.position.z = -2.5;
+  floor.deform.kind = DeformOptions::Kind::kBones;
+  floor.deform.bones = {{.head = {-50.0, 0.0, 0.0}, .tail = {0.0, 0.0, 0.0}},
+                        {.name = "end",
+                         .parent = "bone",
+                         .head = {0.0, 0.0, 0.0},
+                         .tail = {50.0, 0.0, 0.0},
+                         .rotation_degrees = {0.0, -20.0, 0.0}}};
   scene.objects = {body, floor};
   return scene;
 }

@@ -296,13 +296,23 @@ void declare_render(CLI::App& app, Arguments& arguments, int& status_code) {
                   "This many pictures of the objects' full turn, numbered NAME_000 and on")
       ->check(CLI::Range(0, 100000));
   sub->add_option("--stats", wish.stats, "File for the statistics as JSON, in place of text");
+  sub->add_option("--save-material",
+                  wish.materials,
+                  "OBJECT=FILE.vdb: the object's material with its edits; may be given again");
+  sub->add_flag("--no-edits", wish.no_edits, "Leave out the edits of the scene");
+  sub->add_flag("--at-rest", wish.at_rest, "Leave out the bending of the scene");
+  sub->add_flag("--swing",
+                wish.swing,
+                "Over a turntable objects bend from rest to where the scene has them, and back");
   sub->add_option("--threads", wish.threads, "0: one a processor")->check(CLI::Range(0, 1024));
   sub->footer(
       "Ctrl-C stops; a picture is there whole or not at all.\n"
       "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
       "  opaline render config/scene_marble_torus.toml --output torus.png\n"
       "  opaline render scene.toml --output frame.png --output frame.exr --turntable 60\n"
-      "  opaline render scene.toml --output picture.png --stats picture.json");
+      "  opaline render scene.toml --output picture.png --stats picture.json\n"
+      "  opaline render scene.toml --output bend.png --turntable 24 --swing\n"
+      "  opaline render scene.toml --output after.png --save-material ring=painted.vdb");
   sub->callback([&] { status_code = report(become_render(arguments.programs, wish)); });
 }
 

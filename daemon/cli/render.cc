@@ -13,6 +13,12 @@ Error become_render(const std::filesystem::path& programs, const RenderWish& wis
                                  fmt::format("{}", wish.threads)};
   for (const std::string& output : wish.outputs) words.insert(words.end(), {"--output", output});
   if (!wish.stats.empty()) words.insert(words.end(), {"--stats", wish.stats});
+  for (const std::string& text : wish.materials) {
+    words.insert(words.end(), {"--save-material", text});
+  }
+  if (wish.no_edits) words.emplace_back("--no-edits");
+  if (wish.at_rest) words.emplace_back("--at-rest");
+  if (wish.swing) words.emplace_back("--swing");
   words.insert(words.end(), {"--", wish.scene});
   return become(programs / "opaline-render", std::move(words));
 }

@@ -15,6 +15,10 @@ struct RenderWish {
   int turntable = 0;  ///< pictures of one turn; 0: one picture, as the scene stands
   std::string stats;  ///< file; empty: for people, to standard error
   int threads = 0;    ///< 0: one a processor
+  std::vector<std::string> materials;  ///< OBJECT=FILE.vdb: to be saved with their edits
+  bool no_edits = false;
+  bool at_rest = false;  ///< without bending
+  bool swing = false;    ///< bends over a turntable
 };
 
 /// Becomes `programs`/opaline-render. Errors: kUnavailable when the program is not there.

@@ -4,8 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
 #include <thread>
 
 #include "base/clock.h"
@@ -33,6 +35,10 @@ struct Arguments {
   std::vector<fs::path> outputs;
   int turntable = 0;
   fs::path stats;
+  std::vector<std::string> materials;
+  bool no_edits = false;
+  bool at_rest = false;
+  bool swing = false;
   int threads = 0;
 };
 
@@ -56,15 +62,38 @@ Result<std::vector<Output>> outputs_of(const Arguments& arguments) {
   return outputs;
 }
 
+/// "NAME=FILE" of --save-material: the object's place in the scene, and the file.
+Result<std::pair<std::size_t, fs::path>> material_to_save(const render::Scene& scene,
+                                                          const std::string& text) {
+  const auto equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  for (std::size_t o = 0; o < scene.objects.size() && equals != std::string::npos; ++o) {
+    if (scene.objects[o].name != name) continue;
+    if (scene.objects[o].kind == render::ObjectOptions::Kind::kOpaque) {
+      return invalid_argument(fmt::format("--save-material {}: \"{}\" is opaque", text, name));
+    }
+    return std::pair(o, fs::path(text.substr(equals + 1)));
+  }
+  return invalid_argument(fmt::format(
+      "--save-material {}: expected OBJECT=FILE.vdb with an object of the scene", text));
+}
+
 class Session {
  public:
   Session(const Arguments& arguments, render::Scene scene, std::vector<Output> outputs)
       : arguments_(arguments), scene_(std::move(scene)), outputs_(std::move(outputs)) {}
 
   Result<void> run(ThreadTeam& team, const std::stop_token& stop) {
+    render::Scene first = scene_;
+    for (render::ObjectOptions& object : first.objects) {
+      if (arguments_.swing) object.deform = {};
+    }
     const auto renderer = SceneRenderer::create(
-        scene_, team, [&](std::string_view what, double share) { show(what, 0.5 * share); }, stop);
+        first, team, [&](std::string_view what, double share) { show(what, 0.5 * share); }, stop);
     if (!renderer) return renderer.error().in(arguments_.scene.string());
+    for (const std::string& text : arguments_.materials) {
+      if (auto saved = save_material(**renderer, text); !saved) return saved;
+    }
     const int pictures = std::max(1, arguments_.turntable);
     for (int k = 0; k < pictures; ++k) {
       show(fmt::format("picture {} of {}", k + 1, pictures), 0.5 + 0.5 * k / pictures);
@@ -78,8 +107,38 @@ class Session {
     view_.on_event("progress", {{"step", step}, {"fraction", fraction}});
   }
 
+  Result<void> save_material(SceneRenderer& renderer, const std::string& text) {
+    const auto what = material_to_save(scene_, text);
+    if (!what) return what.error();
+    const auto origin =
+        renderer.body(what->first)
+            ->save(system_files(), what->second, fmt::format("opaline-render {}", version()));
+    if (!origin) return origin.error();
+    view_.say(fmt::format("material  {}: origin = [\"{} mm\", \"{} mm\", \"{} mm\"]",
+                          what->second.string(),
+                          origin->x,
+                          origin->y,
+                          origin->z));
+    return ok();
+  }
+
+  /// From rest to the full bend and back, once around.
+  Result<void> swing(SceneRenderer& renderer, double share, const std::stop_token& stop) {
+    for (std::size_t o = 0; o < scene_.objects.size(); ++o) {
+      render::DeformOptions deform = scene_.objects[o].deform;
+      if (deform.kind == render::DeformOptions::Kind::kNone) continue;
+      deform.amount *= 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * share);
+      const auto bent = renderer.bend(o, deform, stop);
+      if (!bent) return bent.error().in(fmt::format("object \"{}\"", scene_.objects[o].name));
+    }
+    return ok();
+  }
+
   Result<void> picture(SceneRenderer& renderer, int k, int pictures, const std::stop_token& stop) {
     const TurnedView turn = turned(scene_, 360.0 * k / pictures);
+    if (arguments_.swing) {
+      if (auto bent = swing(renderer, static_cast<double>(k) / pictures, stop); !bent) return bent;
+    }
     if (auto lit = renderer.light(turn.lights, stop); !lit) return lit;
     const auto radiance = renderer.draw(render::camera_of(turn.camera, scene_.picture), stop);
     if (!radiance) return radiance.error();
@@ -119,6 +178,13 @@ Result<void> run(const Arguments& arguments) {
   if (!outputs) return outputs.error();
   auto scene = config::load_scene(arguments.scene);
   if (!scene) return scene.error();
+  for (render::ObjectOptions& object : scene->objects) {
+    if (arguments.no_edits) object.edits.clear();
+    if (arguments.at_rest) object.deform = {};
+  }
+  for (const std::string& text : arguments.materials) {
+    if (auto what = material_to_save(*scene, text); !what) return what.error();
+  }
   std::stop_source stop;
   const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
   if (!signals) return signals.error();
@@ -139,13 +205,23 @@ int program(int argc, char** argv) {
                  "This many pictures of the objects' full turn, numbered NAME_000 and on")
       ->check(CLI::Range(0, 100000));
   app.add_option("--stats", arguments.stats, "File for the statistics as JSON, in place of text");
+  app.add_option("--save-material",
+                 arguments.materials,
+                 "OBJECT=FILE.vdb: the object's material with its edits; may be given again");
+  app.add_flag("--no-edits", arguments.no_edits, "Leaves out the edits of the scene");
+  app.add_flag("--at-rest", arguments.at_rest, "Leaves out the bending of the scene");
+  app.add_flag("--swing",
+               arguments.swing,
+               "Over a turntable objects bend from rest to where the scene has them, and back");
   app.add_option("--threads", arguments.threads, "0: one a processor")->check(CLI::Range(0, 1024));
   app.set_version_flag("--version", fmt::format("opaline-render {}", version()));
   app.footer(
       "Ctrl-C stops; a picture is there whole or not at all.\n"
       "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
       "  opaline-render config/scene_marble_torus.toml --output torus.png\n"
-      "  opaline-render scene.toml --output frame.png --output frame.exr --turntable 60");
+      "  opaline-render scene.toml --output frame.png --output frame.exr --turntable 60\n"
+      "  opaline-render scene.toml --output bend.png --turntable 24 --swing\n"
+      "  opaline-render scene.toml --output after.png --save-material ring=painted.vdb");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -3,35 +3,41 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 namespace opaline::render {
 namespace {
 
-struct Term {
-  int row = 0;
-  int column = 0;
-  Lanes<double> value;
-};
-
-/// Sums terms of equal place into the matrix; terms on the diagonal belong to
-/// the row's sum as all do.
-LaneMatrix<double> gather(std::vector<Term> terms, std::vector<Lanes<double>> sinks) {
-  LaneMatrix<double> matrix;
-  matrix.sinks = std::move(sinks);
-  std::ranges::sort(terms, {}, [](const Term& t) { return std::pair(t.row, t.column); });
-  std::size_t i = 0;
-  for (int row = 0; row < matrix.rows(); ++row) {
-    while (i < terms.size() && terms[i].row == row) {
-      const int column = terms[i].column;
-      Lanes<double> sum = Lanes<double>::zero();
-      for (; i < terms.size() && terms[i].row == row && terms[i].column == column; ++i)
-        sum += terms[i].value;
-      matrix.columns.push_back(column);
-      matrix.entries.push_back(sum);
+/// Which vertices share a tetrahedron: the columns of each row, rising.
+LaneMatrix<double> pattern_of(const TetMesh& mesh) {
+  std::vector<std::pair<int, int>> pairs;
+  pairs.reserve(12 * mesh.tets.size());
+  for (const auto& tet : mesh.tets) {
+    for (int i = 0; i < 4; ++i) {
+      for (int k = 0; k < 4; ++k) {
+        if (k != i) pairs.emplace_back(tet[i], tet[k]);
+      }
     }
-    matrix.starts.push_back(static_cast<int>(matrix.columns.size()));
   }
+  std::ranges::sort(pairs);
+  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  LaneMatrix<double> matrix;
+  matrix.sinks.resize(mesh.vertices.size(), Lanes<double>::zero());
+  matrix.entries.resize(pairs.size(), Lanes<double>::zero());
+  matrix.starts.assign(mesh.vertices.size() + 1, 0);
+  for (const auto& [row, column] : pairs) {
+    matrix.columns.push_back(column);
+    ++matrix.starts[row + 1];
+  }
+  std::partial_sum(matrix.starts.begin(), matrix.starts.end(), matrix.starts.begin());
   return matrix;
+}
+
+Lanes<double>& entry(LaneMatrix<double>& matrix, int row, int column) {
+  const auto first = matrix.columns.begin() + matrix.starts[row];
+  const auto place =
+      std::lower_bound(first, matrix.columns.begin() + matrix.starts[row + 1], column);
+  return matrix.entries[place - matrix.columns.begin()];
 }
 
 /// Gradients of the four shape functions, and the volume.
@@ -62,62 +68,61 @@ double area_of(const TetMesh& mesh, const std::array<int, 3>& t) {
 
 FiniteElements::FiniteElements(const TetMesh& mesh,
                                const reconstruct::diffusion::Boundary& boundary)
-    : mesh_(&mesh),
-      boundary_(boundary),
-      surface_(surface_of(mesh)),
-      areas_(mesh.vertices.size(), 0.0) {
-  for (const auto& triangle : surface_) {
-    for (const int v : triangle) areas_[v] += area_of(mesh, triangle) / 3.0;
-  }
-}
+    : mesh_(&mesh), boundary_(boundary), surface_(surface_of(mesh)), matrix_(pattern_of(mesh)) {}
 
 Result<FiniteElements> FiniteElements::create(const TetMesh& mesh,
                                               std::span<const Optics> optics,
                                               const reconstruct::diffusion::Boundary& boundary) {
-  if (optics.size() != mesh.tets.size()) {
-    return invalid_argument(
-        fmt::format("{} places of material for {} tetrahedra", optics.size(), mesh.tets.size()));
-  }
-  if (auto valid = validate(optics); !valid) return valid.error();
   FiniteElements elements(mesh, boundary);
-  elements.assemble(optics);
+  if (auto taken = elements.update(optics); !taken) return taken.error();
   return elements;
 }
 
-void FiniteElements::assemble(std::span<const Optics> optics) {
-  std::vector<Term> terms;
-  terms.reserve(12 * mesh_->tets.size() + 6 * surface_.size());
-  std::vector<Lanes<double>> sinks(mesh_->vertices.size(), Lanes<double>::zero());
-  for (std::size_t t = 0; t < mesh_->tets.size(); ++t) {
-    const Element element = element_of(*mesh_, t);
-    for (int i = 0; i < 4; ++i) {
+Result<void> FiniteElements::update(std::span<const Optics> optics) {
+  if (optics.size() != mesh_->tets.size()) {
+    return invalid_argument(
+        fmt::format("{} places of material for {} tetrahedra", optics.size(), mesh_->tets.size()));
+  }
+  if (auto valid = validate(optics); !valid) return valid.error();
+  std::ranges::fill(matrix_.entries, Lanes<double>::zero());
+  std::ranges::fill(matrix_.sinks, Lanes<double>::zero());
+  for (std::size_t t = 0; t < mesh_->tets.size(); ++t) add_volume(t, optics[t]);
+  areas_.assign(mesh_->vertices.size(), 0.0);
+  for (const auto& triangle : surface_) add_surface(triangle);
+  return ok();
+}
+
+void FiniteElements::add_volume(std::size_t tet, const Optics& optics) {
+  const Element element = element_of(*mesh_, tet);
+  const auto& corners = mesh_->tets[tet];
+  for (int i = 0; i < 4; ++i) {
+    Lanes<double>& sink = matrix_.sinks[corners[i]];
+    for (int c = 0; c < 3; ++c) {
+      sink.set(c, sink[c] + 0.25 * element.volume * optics.absorption[c]);
+    }
+    for (int k = 0; k < 4; ++k) {
+      if (k == i) continue;
+      const double stiffness = element.volume * dot(element.gradients[i], element.gradients[k]);
+      Lanes<double> value = Lanes<double>::zero();
       for (int c = 0; c < 3; ++c) {
-        Lanes<double>& sink = sinks[mesh_->tets[t][i]];
-        sink.set(c, sink[c] + 0.25 * element.volume * optics[t].absorption[c]);
+        value.set(c,
+                  stiffness * optics.diffusion[c] + element.volume / 20.0 * optics.absorption[c]);
       }
-      for (int k = 0; k < 4; ++k) {
-        if (k == i) continue;
-        const double stiffness = element.volume * dot(element.gradients[i], element.gradients[k]);
-        Lanes<double> value = Lanes<double>::zero();
-        for (int c = 0; c < 3; ++c) {
-          value.set(
-              c,
-              stiffness * optics[t].diffusion[c] + element.volume / 20.0 * optics[t].absorption[c]);
-        }
-        terms.push_back({mesh_->tets[t][i], mesh_->tets[t][k], value});
-      }
+      entry(matrix_, corners[i], corners[k]) += value;
     }
   }
-  for (const auto& triangle : surface_) {
-    const double mass = area_of(*mesh_, triangle) / (24.0 * boundary_.a);  // area / 12 over 2 A
-    for (int i = 0; i < 3; ++i) {
-      sinks[triangle[i]] += Lanes<double>::all(4.0 * mass);
-      for (int k = 0; k < 3; ++k) {
-        if (k != i) terms.push_back({triangle[i], triangle[k], Lanes<double>::all(mass)});
-      }
+}
+
+void FiniteElements::add_surface(const std::array<int, 3>& triangle) {
+  const double area = area_of(*mesh_, triangle);
+  const double mass = area / (24.0 * boundary_.a);  // area / 12 over 2 A
+  for (int i = 0; i < 3; ++i) {
+    areas_[triangle[i]] += area / 3.0;
+    matrix_.sinks[triangle[i]] += Lanes<double>::all(4.0 * mass);
+    for (int k = 0; k < 3; ++k) {
+      if (k != i) entry(matrix_, triangle[i], triangle[k]) += Lanes<double>::all(mass);
     }
   }
-  matrix_ = gather(std::move(terms), std::move(sinks));
 }
 
 std::vector<Lanes<double>> FiniteElements::load(std::span<const std::array<float, 3>> q) const {

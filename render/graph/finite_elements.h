@@ -30,6 +30,10 @@ class FiniteElements {
                                        std::span<const Optics> optics,
                                        const reconstruct::diffusion::Boundary& boundary);
 
+  /// Takes other coefficients, and the mesh as it is now, its vertices moved and its tetrahedra the same; the matrix
+  /// keeps its pattern. Errors: as create().
+  Result<void> update(std::span<const Optics> optics);
+
   const LaneMatrix<double>& matrix() const { return matrix_; }
   std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q) const;
   SurfaceLight surface_light(std::span<const std::array<float, 3>> q,
@@ -40,7 +44,8 @@ class FiniteElements {
 
  private:
   FiniteElements(const TetMesh& mesh, const reconstruct::diffusion::Boundary& boundary);
-  void assemble(std::span<const Optics> optics);
+  void add_volume(std::size_t tet, const Optics& optics);
+  void add_surface(const std::array<int, 3>& triangle);
 
   const TetMesh* mesh_;
   reconstruct::diffusion::Boundary boundary_;

@@ -52,30 +52,40 @@ QuadGraph make_quad_graph(const TetMesh& mesh) {
   QuadGraph graph;
   const auto neighbours = neighbours_of(mesh);
   const std::size_t count = mesh.tets.size();
-  graph.inner.reserve(count);
-  for (std::size_t t = 0; t < count; ++t) {
-    graph.inner.push_back(centroid_of(mesh, t));
-    graph.volumes.push_back(volume_of(mesh, t));
-  }
+  graph.inner.resize(count);
+  graph.volumes.resize(count);
   graph.links.resize(count);
   for (std::size_t t = 0; t < count; ++t) {
     for (int k = 0; k < 4; ++k) {
-      const FaceShape face = shape_of(mesh, face_of(mesh.tets[t], k));
-      const int beyond = neighbours[t][k];
-      const Vec3 target = beyond >= 0 ? graph.inner[beyond] : face.centroid;
       QuadGraph::Link& link = graph.links[t][k];
-      link = {beyond,
-              -1,
-              face.area,
-              dot(face.centroid - graph.inner[t], face.normal),
-              length(target - graph.inner[t])};
-      if (beyond >= 0) continue;
+      link.inner = neighbours[t][k];
+      if (link.inner >= 0) continue;
       link.surface = static_cast<int>(graph.surface.size());
-      graph.surface.push_back(
-          {face.centroid, face.normal, static_cast<int>(t), face.area, link.reach, link.length});
+      graph.surface.push_back({{}, {}, static_cast<int>(t)});
     }
   }
+  update_geometry(mesh, graph);
   return graph;
+}
+
+void update_geometry(const TetMesh& mesh, QuadGraph& graph) {
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    graph.inner[t] = centroid_of(mesh, t);
+    graph.volumes[t] = volume_of(mesh, t);
+  }
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+    for (int k = 0; k < 4; ++k) {
+      const FaceShape face = shape_of(mesh, face_of(mesh.tets[t], k));
+      QuadGraph::Link& link = graph.links[t][k];
+      const Vec3 target = link.inner >= 0 ? graph.inner[link.inner] : face.centroid;
+      link.area = face.area;
+      link.reach = dot(face.centroid - graph.inner[t], face.normal);
+      link.length = length(target - graph.inner[t]);
+      if (link.inner >= 0) continue;
+      graph.surface[link.surface] = {
+          face.centroid, face.normal, static_cast<int>(t), face.area, link.reach, link.length};
+    }
+  }
 }
 
 TetMesh pack(const TetMesh& mesh) {

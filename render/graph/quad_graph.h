@@ -42,6 +42,10 @@ struct QuadGraph {
 /// Needs a valid mesh (validate()).
 QuadGraph make_quad_graph(const TetMesh& mesh);
 
+/// Makes places, areas, volumes and lengths those of the mesh as it is now, whose vertices have moved and whose
+/// tetrahedra are those the graph was made from: the links stay.
+void update_geometry(const TetMesh& mesh, QuadGraph& graph);
+
 /// The same mesh with tetrahedra and vertices in the order of a space-filling
 /// curve (Morton), so that what is near in space is near in memory: the paper's
 /// packing (sec. 5.1), for caches instead of textures.

@@ -17,6 +17,17 @@ double centroid(double t) { return t < 1e-3 ? 0.5 - t / 12.0 : 1.0 / t - 1.0 / s
 
 BeamDeposit::BeamDeposit(TetMesh mesh, std::vector<Optics> optics)
     : mesh_(std::move(mesh)), optics_(std::move(optics)), neighbours_(neighbours_of(mesh_)) {
+  place_faces();
+}
+
+void BeamDeposit::update(const std::vector<Vec3>& vertices, const std::vector<Optics>& optics) {
+  mesh_.vertices = vertices;
+  optics_ = optics;
+  place_faces();
+}
+
+void BeamDeposit::place_faces() {
+  faces_.clear();
   for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
     for (int k = 0; k < 4; ++k) {
       if (neighbours_[t][k] >= 0) continue;

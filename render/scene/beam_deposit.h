@@ -30,6 +30,9 @@ class BeamDeposit {
   /// Needs a valid mesh and coefficients one a tetrahedron.
   BeamDeposit(TetMesh mesh, std::vector<Optics> optics);
 
+  /// Takes other places of the same vertices, and other coefficients.
+  void update(const std::vector<Vec3>& vertices, const std::vector<Optics>& optics);
+
   /// The faces of the surface: a ray's start in the middle of each, its outward normal and its area.
   struct Face {
     SurfacePlace middle;
@@ -61,6 +64,7 @@ class BeamDeposit {
     int steps = 0;
   };
   Deposit step(Walk& walk) const;
+  void place_faces();
 
   TetMesh mesh_;
   std::vector<Optics> optics_;

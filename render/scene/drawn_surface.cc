@@ -10,7 +10,8 @@
 namespace opaline::render {
 namespace {
 
-constexpr double kStep = 0.02;  // of an edge, for gradients
+constexpr double kStep = 0.02;      // of an edge, for gradients
+constexpr double kBendStep = 1e-3;  // of an edge, for those of a deformation
 
 double mean_edge(const TriangleMesh& mesh) {
   double sum = 0.0;
@@ -50,6 +51,24 @@ DrawnSurface::DrawnSurface(TriangleMesh coarse, const SignedDistance& solid, int
     const Vec3 gradient = solid.normal(mesh_.vertices[v], step);
     if (dot(gradient, normals_[v]) > 0.5) normals_[v] = gradient;
   }
+}
+
+void DrawnSurface::bend(const Deformation& deformation) {
+  if (rest_.empty()) {
+    rest_ = mesh_.vertices;
+    rest_normals_ = normals_;
+  }
+  const double step = kBendStep * mean_edge(mesh_);
+  for (std::size_t v = 0; v < rest_.size(); ++v) {
+    mesh_.vertices[v] = deformation.at(rest_[v]);
+    normals_[v] = deformation.normal(rest_[v], rest_normals_[v], step);
+  }
+}
+
+std::vector<float> DrawnSurface::spread_marks(const std::vector<bool>& of_coarse) const {
+  std::vector<float> marks(of_coarse.begin(), of_coarse.end());
+  for (const auto& [a, b] : parents_) marks.push_back(0.5F * (marks[a] + marks[b]));
+  return marks;
 }
 
 void DrawnSurface::refine(const SignedDistance& solid) {

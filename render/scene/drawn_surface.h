@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "render/deform/deformation.h"
 #include "render/graph/optics.h"
 #include "render/mesh/signed_distance.h"
 #include "render/mesh/triangle_mesh.h"
@@ -17,17 +18,24 @@ class DrawnSurface {
   /// As it is, where there is no solid to follow.
   explicit DrawnSurface(TriangleMesh mesh);
 
+  /// Moves the surface from where it was at rest; its normals turn with it.
+  void bend(const Deformation& deformation);
+
   const TriangleMesh& mesh() const { return mesh_; }
   /// Of each vertex: of the signed distance, else of the triangles around it.
   const std::vector<Vec3>& normals() const { return normals_; }
   /// Values of the coarse vertices on all of them: a new vertex has the mean of the two it lies between.
   SurfaceLight spread(const SurfaceLight& of_coarse) const;
+  /// 1 where a coarse vertex is marked, 0 where not, the mean between.
+  std::vector<float> spread_marks(const std::vector<bool>& of_coarse) const;
 
  private:
   void refine(const SignedDistance& solid);
 
   TriangleMesh mesh_;
   std::vector<Vec3> normals_;
+  std::vector<Vec3> rest_;  // of the vertices, and their normals
+  std::vector<Vec3> rest_normals_;
   std::size_t coarse_ = 0;
   std::vector<std::array<int, 2>> parents_;  // of the vertices after the coarse ones
 };

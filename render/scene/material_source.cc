@@ -75,8 +75,15 @@ Result<MaterialSource> MaterialSource::create(const TranslucentOptions& options,
     return scatters.error().in(options.file.string());
   }
   source.ior_ = material->ior;
-  source.block_ = std::make_shared<const Material>(*std::move(material));
+  source.block_ = std::make_shared<Material>(*std::move(material));
   return source;
+}
+
+void MaterialSource::take_block(std::shared_ptr<Material> block, Vec3 origin) {
+  block_ = std::move(block);
+  options_.origin = origin;
+  options_.scale = 1.0;
+  options_.tiling = Tiling::kClamp;
 }
 
 bool MaterialSource::is_homogeneous() const {

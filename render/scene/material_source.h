@@ -24,6 +24,10 @@ class MaterialSource {
                                        const Pose& scene_from_shape);
 
   Optics at(Vec3 place_in_scene) const;
+  /// The file's block; none where there is no file.
+  const std::shared_ptr<Material>& block() const { return block_; }
+  /// From now on this block, its corner at `origin` in the shape's frame, clamped beyond it.
+  void take_block(std::shared_ptr<Material> block, Vec3 origin);
   double ior() const { return ior_; }
   /// Whether every place has the same coefficients.
   bool is_homogeneous() const;
@@ -37,7 +41,7 @@ class MaterialSource {
   TranslucentOptions options_;
   Pose shape_from_scene_;
   double ior_;
-  std::shared_ptr<const Material> block_;  // none: options_'s own
+  std::shared_ptr<Material> block_;  // none: options_'s own
 };
 
 /// Where a coordinate beyond 0 to n - 1 is looked up, by tiling: a place between cell centres again.

@@ -17,6 +17,14 @@ using reconstruct::diffusion::refracted_cosine;
 constexpr double kGrazing =
     0.02;  // cosine below which an interpolated normal looks away from the camera
 
+bool is_marked(const Look& look, const Surfaces::Hit& hit) {
+  double mark = 0.0;
+  for (int k = 0; k < 3 && !look.marks.empty(); ++k) {
+    mark += hit.weights[k] * look.marks[hit.vertices[k]];
+  }
+  return mark > 0.5;
+}
+
 /// The normal bent towards the viewer where interpolation has turned it away.
 Vec3 facing(Vec3 normal, Vec3 view) {
   const double cosine = dot(normal, view);
@@ -104,6 +112,9 @@ Painter::Seen Painter::look(const Ray& ray) const {
   hit->normal = facing(hit->normal, view);
   hit->start.normal = hit->normal;
   Seen seen{.radiance = {}, .object = hit->object};
+  if (is_marked(look, *hit)) {
+    return {.radiance = {look.mark_radiance, 0.0, look.mark_radiance}, .object = hit->object};
+  }
   seen.radiance =
       look.translucent ? emerging(look, *hit, dot(hit->normal, view)) : scattered(look, *hit);
   add_mirrored(look, *hit, view, seen.radiance);

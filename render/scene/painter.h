@@ -20,6 +20,9 @@ struct Look {
   Colour reflectance{};  ///< of an opaque one
   SurfaceLight light{};  ///< of a translucent one's vertices
   std::vector<float>
+      marks{};  ///< of its vertices; above 1/2: shown in magenta, as wrong. Empty: none
+  double mark_radiance = 0.0;  ///< of the magenta, W/(mm^2 sr)
+  std::vector<float>
       sky{};  ///< of an opaque one's vertices: the share of the environment that it sees, cosine-weighted
 };
 

@@ -65,6 +65,9 @@ Result<void> check_translucent(const TranslucentOptions& material) {
     return invalid_argument(fmt::format("ior = {}; expected 1 to 3", material.ior));
   }
   if (!(material.scale > 0.0)) return invalid_argument("scale: expected more than 0");
+  if (material.edit_cells < 1 || material.edit_cells > 1024) {
+    return invalid_argument("edit_cells: expected 1 to 1024");
+  }
   return ok();
 }
 
@@ -73,6 +76,10 @@ Result<void> check_object(const ObjectOptions& object) {
   if (!(object.surface.roughness >= 0.01 && object.surface.roughness <= 1.0)) {
     return invalid_argument(
         fmt::format("roughness = {}; expected 0.01 to 1", object.surface.roughness));
+  }
+  if (auto r = validate(object.deform); !r) return r.error().in("deform");
+  for (std::size_t k = 0; k < object.edits.size(); ++k) {
+    if (auto r = validate(object.edits[k]); !r) return r.error().in(fmt::format("edit {}", k + 1));
   }
   if (object.kind == ObjectOptions::Kind::kTranslucent) return check_translucent(object.material);
   if (!(object.opaque_ior >= 1.0 && object.opaque_ior <= 3.0)) {

@@ -9,6 +9,8 @@
 #include "base/pose.h"
 #include "base/result.h"
 #include "reconstruct/diffusion/boundary.h"
+#include "render/deform/deform_options.h"
+#include "render/edit/edit_options.h"
 
 /// A scene as plain values: what a file describes and SceneRenderer draws. Lengths in mm; colours are red, green, blue.
 namespace opaline::render {
@@ -51,6 +53,8 @@ struct TranslucentOptions {
   Colour reduced_scattering{1.0, 1.0, 1.0};
   PatternOptions pattern;
   double ior = 1.3;  ///< 1 to 3; a file brings its own
+  int edit_cells =
+      96;  ///< along the longest side of the block that strokes go into, where there is no file; 1 to 1024
 };
 
 enum class SpecularModel : std::uint8_t { kNone, kCookTorrance, kWard };
@@ -66,7 +70,10 @@ struct ObjectOptions {
   std::string name = "object";
   Kind kind = Kind::kTranslucent;
   ShapeOptions shape;
-  TranslucentOptions material;        ///< of a translucent one
+  TranslucentOptions material;  ///< of a translucent one
+  std::vector<EditOptions>
+      edits;  ///< of a translucent one: strokes in its material, one after another
+  DeformOptions deform;
   Colour reflectance{0.5, 0.5, 0.5};  ///< of an opaque one: Lambert's, 0 to 1
   double opaque_ior = 1.0;            ///< of an opaque one's coat; 1: none, so matte
   SurfaceOptions surface;

@@ -48,6 +48,20 @@ void for_each(std::size_t count, ThreadTeam& team, const std::stop_token& stop, 
   });
 }
 
+/// What the surface shows where its fluence is highest, about.
+double brightest(const Look& look) {
+  float most = 0.0F;
+  for (const auto& fluence : look.light.fluence) most = std::max(most, std::ranges::max(fluence));
+  return most / (4.0 * std::numbers::pi * look.ior * look.ior);
+}
+
+Box own_bounds(const TriangleMesh& surface, const Pose& scene_from_own) {
+  TriangleMesh own;
+  const Pose own_from_scene = scene_from_own.inverse();
+  for (const Vec3& p : surface.vertices) own.vertices.push_back(own_from_scene.apply(p));
+  return bounds(own);
+}
+
 /// The ray that goes on inside of light from `towards` (Snell).
 Vec3 refracted(Vec3 towards, Vec3 normal, double ior) {
   const double cosine = dot(normal, towards);
@@ -96,34 +110,23 @@ Result<void> SceneRenderer::add(const ObjectOptions& object, std::stop_token sto
 }
 
 Result<void> SceneRenderer::add_translucent(const ObjectOptions& object, std::stop_token stop) {
-  Result<LoadedShape> shape = LoadedShape{};
-  Result<MaterialSource> material = Error{};
-  {
-    const Stopwatch watch(statistics_.load_seconds);
-    shape = load_shape(object.shape);
-    if (!shape) return shape.error();
-    material = MaterialSource::create(object.material, scene_from_shape(object.shape));
-    if (!material) return material.error();
-  }
-  auto body = Subsurface::create(
-      *shape->solid,
-      [&](Vec3 place) { return material->at(place); },
-      material->ior(),
-      scene_.diffusion,
-      team_,
-      stop);
+  auto body =
+      TranslucentBody::create(object, scene_.diffusion, scene_.picture.refinement, team_, stop);
   if (!body) return body.error();
-  const Subsurface::Report& report = (*body)->report();
+  const Subsurface::Report& report = (*body)->subsurface().report();
+  statistics_.load_seconds += (*body)->load_seconds();
   statistics_.mesh_seconds += report.mesh_seconds;
   statistics_.setup_seconds += report.setup_seconds;
-  std::ranges::move(shape->notes, std::back_inserter(statistics_.notes));
+  for (const std::string& note : (*body)->notes()) {
+    statistics_.notes.push_back(fmt::format("{}: {}", object.name, note));
+  }
   note_resolution(object, report);
-  auto drawn =
-      std::make_unique<DrawnSurface>((*body)->surface(), *shape->solid, scene_.picture.refinement);
-  const int number = surfaces_.add(drawn->mesh(), drawn->normals());
-  statistics_.objects.push_back({object.name, true, drawn->mesh().triangles.size(), report});
-  looks_.push_back({.translucent = true, .ior = material->ior(), .surface = object.surface});
-  bodies_.push_back({*std::move(body), std::move(drawn), number});
+  const DrawnSurface& drawn = (*body)->drawn();
+  const int number = surfaces_.add(drawn.mesh(), drawn.normals());
+  statistics_.objects.push_back({object.name, true, drawn.mesh().triangles.size(), report});
+  looks_.push_back({.translucent = true, .ior = (*body)->ior(), .surface = object.surface});
+  looks_.back().marks = (*body)->marks();
+  bodies_.push_back({*std::move(body), number});
   opaque_.emplace_back();
   return ok();
 }
@@ -133,18 +136,55 @@ Result<void> SceneRenderer::add_opaque(const ObjectOptions& object, std::stop_to
   auto shape = load_opaque(object.shape, kOpaqueTetrahedra, stop);
   if (!shape) return shape.error();
   const bool by_name = shape->solid && object.shape.file.empty();
-  opaque_.push_back(by_name
-                        ? std::make_unique<DrawnSurface>(
-                              *std::move(shape->surface), *shape->solid, scene_.picture.refinement)
-                        : std::make_unique<DrawnSurface>(*std::move(shape->surface)));
-  const DrawnSurface& drawn = *opaque_.back();
-  surfaces_.add(drawn.mesh(), drawn.normals());
-  statistics_.objects.push_back({object.name, false, drawn.mesh().triangles.size(), {}});
+  Opaque opaque;
+  opaque.rest = own_bounds(*shape->surface, scene_from_shape(object.shape));
+  opaque.drawn = by_name ? std::make_unique<DrawnSurface>(
+                               *std::move(shape->surface), *shape->solid, scene_.picture.refinement)
+                         : std::make_unique<DrawnSurface>(*std::move(shape->surface));
+  if (object.deform.kind != DeformOptions::Kind::kNone) {
+    const auto deformation =
+        make_deformation(object.deform, opaque.rest, scene_from_shape(object.shape));
+    if (!deformation) return deformation.error().in("deform");
+    opaque.drawn->bend(**deformation);
+  }
+  surfaces_.add(opaque.drawn->mesh(), opaque.drawn->normals());
+  statistics_.objects.push_back({object.name, false, opaque.drawn->mesh().triangles.size(), {}});
   looks_.push_back({.translucent = false,
                     .ior = object.opaque_ior,
                     .surface = object.surface,
                     .reflectance = object.reflectance});
+  opaque_.push_back(std::move(opaque));
   return ok();
+}
+
+TranslucentBody* SceneRenderer::body(std::size_t object) {
+  for (Body& body : bodies_) {
+    if (body.object == static_cast<int>(object)) return body.body.get();
+  }
+  return nullptr;
+}
+
+Result<std::size_t> SceneRenderer::bend(std::size_t object,
+                                        const DeformOptions& options,
+                                        std::stop_token stop) {
+  if (object >= looks_.size()) return invalid_argument(fmt::format("no object {}", object));
+  std::size_t inverted = 0;
+  if (TranslucentBody* const own = body(object)) {
+    const auto bent = own->bend(options);
+    if (!bent) return bent;
+    inverted = *bent;
+    looks_[object].marks = own->marks();
+    surfaces_.move(static_cast<int>(object), own->drawn().mesh().vertices, own->drawn().normals());
+  } else {
+    DrawnSurface& drawn = *opaque_[object].drawn;
+    const auto deformation = make_deformation(
+        options, opaque_[object].rest, scene_from_shape(scene_.objects[object].shape));
+    if (!deformation) return deformation.error();
+    drawn.bend(**deformation);
+    surfaces_.move(static_cast<int>(object), drawn.mesh().vertices, drawn.normals());
+  }
+  if (auto seen = look_at_sky(std::move(stop)); !seen) return seen.error();
+  return inverted;
 }
 
 void SceneRenderer::note_resolution(const ObjectOptions& object, const Subsurface::Report& report) {
@@ -171,15 +211,17 @@ void SceneRenderer::note_resolution(const ObjectOptions& object, const Subsurfac
 Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
   body_sky_.resize(bodies_.size());
   if (is_black(scene_.environment.radiance)) {
-    statistics_.left_out.emplace_back("environment: it is black");
+    leave_out("environment: it is black");
     for (std::size_t o = 0; o < opaque_.size(); ++o) {
-      if (opaque_[o]) looks_[o].sky.assign(opaque_[o]->mesh().vertices.size(), 0.0F);
+      if (opaque_[o].drawn) {
+        looks_[o].sky.assign(opaque_[o].drawn->mesh().vertices.size(), 0.0F);
+      }
     }
     return ok();
   }
   const Stopwatch watch(statistics_.setup_seconds);
   const bool hidden = scene_.environment.rays > 0;
-  if (!hidden) statistics_.left_out.emplace_back("environment: nothing hides it (rays = 0)");
+  if (!hidden) leave_out("environment: nothing hides it (rays = 0)");
   const auto directions = cosine_directions(hidden ? scene_.environment.rays : 256);
   const auto share = [&](const SurfacePlace& place, const auto& weight) {
     if (hidden) return surfaces_.sky(place, directions, weight);
@@ -188,7 +230,7 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
     return sum / static_cast<double>(directions.size());
   };
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    const auto& places = bodies_[b].subsurface->places();
+    const auto& places = bodies_[b].body->subsurface().places();
     const double ior = looks_[bodies_[b].object].ior;
     body_sky_[b].resize(places.size());
     for_each(places.size(), team_, stop, [&](std::size_t i) {
@@ -197,13 +239,13 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
     });
   }
   for (std::size_t o = 0; o < opaque_.size(); ++o) {
-    if (!opaque_[o]) continue;
-    const TriangleMesh& mesh = opaque_[o]->mesh();
+    if (!opaque_[o].drawn) continue;
+    const TriangleMesh& mesh = opaque_[o].drawn->mesh();
     const Vec3 size = surfaces_.bounds().size();
     const double small = 1e-4 * std::max({size.x, size.y, size.z});
     looks_[o].sky.resize(mesh.vertices.size());
     for_each(mesh.vertices.size(), team_, stop, [&](std::size_t v) {
-      const SurfacePlace place{mesh.vertices[v], opaque_[o]->normals()[v], small};
+      const SurfacePlace place{mesh.vertices[v], opaque_[o].drawn->normals()[v], small};
       looks_[o].sky[v] = length(place.normal) > 0.0
                              ? static_cast<float>(share(place, [](double) { return 1.0; }))
                              : 0.0F;
@@ -228,7 +270,7 @@ Colour SceneRenderer::passed(const LightOptions& light,
 }
 
 void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token stop) {
-  const auto& places = body.subsurface->places();
+  const auto& places = body.body->subsurface().places();
   const double ior = looks_[body.object].ior;
   std::vector<std::atomic<bool>> reaches(lights_.size());
   for_each(places.size(), team_, stop, [&](std::size_t i) {
@@ -244,7 +286,7 @@ void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token st
 }
 
 void SceneRenderer::send_beams(const Body& body, Entering& light, std::stop_token stop) {
-  const auto& faces = body.subsurface->beams()->faces();
+  const auto& faces = body.body->subsurface().beams()->faces();
   const double ior = looks_[body.object].ior;
   for (std::size_t l = 0; l < lights_.size(); ++l) {
     std::vector<Beam> beams(faces.size());
@@ -264,13 +306,13 @@ void SceneRenderer::send_beams(const Body& body, Entering& light, std::stop_toke
 SceneRenderer::Entering SceneRenderer::entering(const Body& body, std::stop_token stop) {
   const auto& sky = body_sky_[&body - bodies_.data()];
   Entering light;
-  light.q.resize(body.subsurface->places().size());
+  light.q.resize(body.body->subsurface().places().size());
   for (std::size_t i = 0; i < sky.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
       light.q[i][c] = static_cast<float>(sky[i] * scene_.environment.radiance[c]);
     }
   }
-  if (scene_.diffusion.entry == Entry::kCollimated && body.subsurface->beams() != nullptr) {
+  if (scene_.diffusion.entry == Entry::kCollimated && body.body->subsurface().beams() != nullptr) {
     send_beams(body, light, stop);
   } else {
     let_in(body, light, stop);
@@ -290,30 +332,33 @@ Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::
       if (stop.stop_requested()) return cancelled("lighting");
     }
     const Stopwatch watch(statistics_.solve_seconds);
-    const auto solved = body.subsurface->light(light.q, light.beams, stop);
+    const auto solved = body.body->subsurface().light(light.q, light.beams, stop);
     SceneStatistics::Object& object = statistics_.objects[body.object];
     if (!solved) return solved.error().in(fmt::format("object \"{}\"", object.name));
     object.iterations = solved->iterations;
     object.relative_residual = solved->relative_residual;
-    looks_[body.object].light = body.drawn->spread(body.subsurface->lit());
+    looks_[body.object].light = body.body->drawn().spread(body.body->subsurface().lit());
+    looks_[body.object].mark_radiance = brightest(looks_[body.object]);
   }
-  leave_out();
+  leave_out_dark();
   return ok();
 }
 
-void SceneRenderer::leave_out() {
-  const auto say = [&](std::string what) {
-    auto& list = statistics_.left_out;
-    if (std::ranges::find(list, what) == list.end()) list.push_back(std::move(what));
-  };
+void SceneRenderer::leave_out(std::string what) {
+  auto& list = statistics_.left_out;
+  if (std::ranges::find(list, what) == list.end()) list.push_back(std::move(what));
+}
+
+void SceneRenderer::leave_out_dark() {
   const bool only_bodies =
-      std::ranges::none_of(opaque_, [](const auto& o) { return o != nullptr; });
+      std::ranges::none_of(opaque_, [](const Opaque& o) { return o.drawn != nullptr; });
   for (std::size_t l = 0; l < lights_.size() && only_bodies; ++l) {
-    if (!light_reaches_[l]) say(fmt::format("{}: it reaches no object", lights_[l].name));
+    if (!light_reaches_[l]) leave_out(fmt::format("{}: it reaches no object", lights_[l].name));
   }
   for (std::size_t o = 0; o < looks_.size(); ++o) {
     if (looks_[o].surface.specular != SpecularModel::kNone && looks_[o].ior == 1.0) {
-      say(fmt::format("specular of {}: nothing is mirrored at ior 1", statistics_.objects[o].name));
+      leave_out(
+          fmt::format("specular of {}: nothing is mirrored at ior 1", statistics_.objects[o].name));
     }
   }
 }

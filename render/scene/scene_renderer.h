@@ -13,7 +13,7 @@
 #include "render/scene/drawn_surface.h"
 #include "render/scene/painter.h"
 #include "render/scene/scene.h"
-#include "render/scene/subsurface.h"
+#include "render/scene/translucent_body.h"
 
 namespace opaline::render {
 
@@ -62,6 +62,11 @@ class SceneRenderer {
 
   /// Lights the objects; the scene's own lights, or the same moved. Starts from the last lighting.
   Result<void> light(const std::vector<LightOptions>& lights, std::stop_token stop);
+  /// The translucent object of that number, to be painted into, or none. Call light() afterwards.
+  TranslucentBody* body(std::size_t object);
+  /// Bends an object from its rest, translucent or opaque; answers how many tetrahedra are turned inside out (see
+  /// TranslucentBody::bend()). Shadows and the environment's visibility follow. Call light() afterwards.
+  Result<std::size_t> bend(std::size_t object, const DeformOptions& options, std::stop_token stop);
   /// Linear radiance and coverage, as Painter says. Call light() first.
   Result<Image<float>> draw(const CameraModel& camera, std::stop_token stop);
 
@@ -69,9 +74,12 @@ class SceneRenderer {
 
  private:
   struct Body {
-    std::unique_ptr<Subsurface> subsurface;
-    std::unique_ptr<DrawnSurface> drawn;
+    std::unique_ptr<TranslucentBody> body;
     int object = 0;
+  };
+  struct Opaque {
+    std::unique_ptr<DrawnSurface> drawn;  // none for a translucent object
+    Box rest;                             // in its own frame
   };
 
   SceneRenderer(const Scene& scene, ThreadTeam& team) : scene_(scene), team_(team) {}
@@ -91,13 +99,14 @@ class SceneRenderer {
                 double ior) const;
   void let_in(const Body& body, Entering& light, std::stop_token stop);
   void send_beams(const Body& body, Entering& light, std::stop_token stop);
-  void leave_out();
+  void leave_out(std::string what);
+  void leave_out_dark();
 
   Scene scene_;
   ThreadTeam& team_;
   std::vector<LightOptions> lights_;
   std::vector<Body> bodies_;
-  std::vector<std::unique_ptr<DrawnSurface>> opaque_;  // by object; none for a translucent one
+  std::vector<Opaque> opaque_;  // by object
   std::vector<std::vector<float>>
       body_sky_;  // of each body's places: int (1 - R) mu dw, not hidden
   Surfaces surfaces_;

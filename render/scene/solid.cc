@@ -3,46 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "base/io/level_set_io.h"
 #include "render/mesh/mesh_distance.h"
 #include "render/mesh/read_mesh.h"
 #include "render/mesh/shapes.h"
+#include "render/mesh/turn.h"
 #include "render/tetrahedra/stuffing.h"
 
 namespace opaline::render {
 namespace {
 
 constexpr int kPlaneCells = 128;
-
-Pose turned(int axis, double degrees) {
-  const double angle = degrees * std::numbers::pi / 180.0;
-  const double c = std::cos(angle);
-  const double s = std::sin(angle);
-  Pose pose;
-  const int i = (axis + 1) % 3;
-  const int j = (axis + 2) % 3;
-  pose.rotation[3 * i + i] = c;
-  pose.rotation[3 * j + j] = c;
-  pose.rotation[3 * i + j] = -s;
-  pose.rotation[3 * j + i] = s;
-  return pose;
-}
-
-Pose chained(const Pose& second, const Pose& first) {
-  Pose pose;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      double sum = 0.0;
-      for (int k = 0; k < 3; ++k) sum += second.rotation[3 * i + k] * first.rotation[3 * k + j];
-      pose.rotation[3 * i + j] = sum;
-    }
-  }
-  pose.translation = second.apply(first.translation);
-  return pose;
-}
 
 double longest(Vec3 size) { return std::max({size.x, size.y, size.z}); }
 
@@ -93,8 +65,7 @@ std::vector<std::string> notes_on(const TriangleMesh& mesh, const std::filesyste
 }  // namespace
 
 Pose scene_from_shape(const ShapeOptions& shape) {
-  const auto& degrees = shape.rotation_degrees;
-  Pose pose = chained(turned(2, degrees[2]), chained(turned(1, degrees[1]), turned(0, degrees[0])));
+  Pose pose = turned_about_axes(shape.rotation_degrees);
   pose.translation = shape.position;
   return pose;
 }

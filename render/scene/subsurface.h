@@ -9,6 +9,7 @@
 
 #include "base/thread_team.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "render/deform/deformation.h"
 #include "render/graph/optics.h"
 #include "render/mesh/signed_distance.h"
 #include "render/scene/beam_deposit.h"
@@ -55,6 +56,15 @@ class Subsurface {
                                                     std::stop_token stop);
   virtual ~Subsurface() = default;
 
+  /// Takes the coefficients anew; the next solution starts from the last. Errors: see validate(optics).
+  Result<void> set_material(const MaterialAt& material);
+  /// Bends the solid as it was at rest; its graph stays. Answers how many tetrahedra that would turn inside out: where
+  /// there are any, nothing has moved and inverted_corners() says where they are. Errors: kInvalidArgument on a polygrid, whose lattice
+  /// cannot bend.
+  Result<std::size_t> bend(const Deformation& deformation);
+  /// Whether each vertex of surface() is a corner of a tetrahedron that the last bend() would have turned inside out.
+  const std::vector<bool>& inverted_corners() const { return inverted_corners_; }
+
   const TriangleMesh& surface() const { return surface_; }
   const Report& report() const { return report_; }
   /// Where q is asked for.
@@ -70,18 +80,44 @@ class Subsurface {
   const SurfaceLight& lit() const { return lit_; }
 
  protected:
+  using Values = std::vector<std::array<float, 3>>;
+
+  Subsurface(TetMesh mesh, const DiffusionOptions& options);
+
+  /// Takes mesh_ and optics_ as they are now.
+  virtual Result<void> assemble() = 0;
+  /// Where the material is taken, at rest.
+  virtual std::vector<Vec3> nodes() const = 0;
+  virtual std::vector<SurfacePlace> flat_places() const = 0;
   virtual reconstruct::diffusion::SolveSummary solve(std::span<const std::array<float, 3>> q,
                                                      std::span<const Beam> beams,
                                                      std::stop_token stop) = 0;
   virtual SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const = 0;
 
-  TriangleMesh surface_;
-  std::vector<SurfacePlace> places_;
-  Report report_;
+  reconstruct::diffusion::SolveOptions solve_options() const {
+    return {.tolerance = options_.tolerance, .max_iterations = options_.max_iterations};
+  }
+  /// Works out the optics and lets the method begin with them.
+  Result<void> begin(const SignedDistance& solid, const MaterialAt& material, ThreadTeam& team);
+
+  TetMesh mesh_;
+  std::vector<int> used_;  // the mesh's vertex of each of the surface's
   DiffusionOptions options_;
+  std::vector<Optics> optics_;
   std::unique_ptr<BeamDeposit> beams_;
 
  private:
+  void sample(const MaterialAt& material);
+  void note_lengths();
+
+  TriangleMesh surface_;
+  std::vector<SurfacePlace> places_;
+  Report report_;
+  ThreadTeam* team_ = nullptr;
+  std::vector<Vec3> rest_;   // of mesh_'s vertices
+  std::vector<Vec3> nodes_;  // at rest
+  std::vector<SurfacePlace> rest_places_;
+  std::vector<bool> inverted_corners_;
   SurfaceLight lit_;
 };
 

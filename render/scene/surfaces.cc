@@ -24,6 +24,14 @@ int Surfaces::add(const TriangleMesh& mesh, const std::vector<Vec3>& normals) {
   return object;
 }
 
+void Surfaces::move(int object,
+                    const std::vector<Vec3>& vertices,
+                    const std::vector<Vec3>& normals) {
+  std::ranges::copy(vertices, mesh_.vertices.begin() + first_vertices_[object]);
+  std::ranges::copy(normals, normals_.begin() + first_vertices_[object]);
+  tree_->refit();
+}
+
 Result<void> Surfaces::build() {
   auto tree = TriangleTree::create(mesh_);
   if (!tree) return tree.error();

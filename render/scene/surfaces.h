@@ -27,6 +27,8 @@ class Surfaces {
 
   /// Adds an object's surface; answers its number.
   int add(const TriangleMesh& mesh, const std::vector<Vec3>& normals);
+  /// Moves an object's vertices; the tree keeps its order. Needs as many as were added, and build().
+  void move(int object, const std::vector<Vec3>& vertices, const std::vector<Vec3>& normals);
   /// Call after the last add(). Errors: see TriangleTree.
   Result<void> build();
 

@@ -71,6 +71,20 @@ Box TriangleTree::box_of(int first, int last) const {
   return box;
 }
 
+void TriangleTree::refit() {
+  for (int n = static_cast<int>(nodes_.size()) - 1; n >= 0;
+       --n) {  // children come after their parent
+    Node& node = nodes_[n];
+    if (node.count > 0) {
+      node.box = box_of(node.first, node.first + node.count);
+    } else {
+      const Box& left = nodes_[n + 1].box;
+      const Box& right = nodes_[node.right].box;
+      node.box = {lower(left.low, right.low), upper(left.high, right.high)};
+    }
+  }
+}
+
 int TriangleTree::build(int first, int last) {
   const int own = static_cast<int>(nodes_.size());
   const Box box = box_of(first, last);

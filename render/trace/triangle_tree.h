@@ -32,6 +32,10 @@ class TriangleTree {
   /// The mesh must outlive it. Errors: kInvalidArgument, see validate().
   static Result<TriangleTree> create(const TriangleMesh& mesh);
 
+  /// The mesh's vertices have moved: the boxes follow, the order stays, which costs speed where triangles that were near
+  /// each other no longer are.
+  void refit();
+
   /// The nearest triangle further along the ray than `beyond`, mm.
   std::optional<RayHit> nearest(const Ray& ray, double beyond = 0.0) const;
   /// Whether anything lies on the ray between `beyond` and `before`, mm: a shadow.

@@ -1,0 +1,114 @@
+#include "render/scene/elements_subsurface.h"
+
+#include <cmath>
+
+#include "render/graph/finite_elements.h"
+#include "render/scene/fresh_hierarchy.h"
+#include "render/trace/vertex_values.h"
+
+namespace opaline::render {
+namespace {
+
+using reconstruct::diffusion::Boundary;
+using reconstruct::diffusion::SolveSummary;
+
+constexpr HierarchyOptions kElementHierarchy{.first_rings = 1};
+
+class ElementsSubsurface final : public Subsurface {
+ public:
+  ElementsSubsurface(TetMesh mesh, const DiffusionOptions& options)
+      : Subsurface(std::move(mesh), options), phi_(mesh_.vertices.size(), Lanes<double>::zero()) {}
+
+  Result<void> begin_with(const SignedDistance& solid,
+                          const MaterialAt& material,
+                          const Boundary& boundary,
+                          ThreadTeam& team) {
+    boundary_ = boundary;
+    if (auto begun = begin(solid, material, team); !begun) return begun;
+    solver_ =
+        std::make_unique<FreshHierarchy<double>>(elements_->matrix(), kElementHierarchy, team);
+    return ok();
+  }
+
+ protected:
+  Result<void> assemble() override {
+    if (!elements_) {
+      auto made = FiniteElements::create(mesh_, optics_, boundary_);
+      if (!made) return made.error();
+      elements_ = std::make_unique<FiniteElements>(*std::move(made));
+      return ok();
+    }
+    auto taken = elements_->update(optics_);
+    if (taken && solver_) solver_->matrix_changed();
+    return taken;
+  }
+
+  std::vector<Vec3> nodes() const override {
+    std::vector<Vec3> centroids;
+    centroids.reserve(mesh_.tets.size());
+    for (std::size_t t = 0; t < mesh_.tets.size(); ++t) centroids.push_back(centroid_of(mesh_, t));
+    return centroids;
+  }
+
+  std::vector<SurfacePlace> flat_places() const override {
+    std::vector<SurfacePlace> places;
+    const std::vector<Vec3> normals = vertex_normals(surface());
+    for (std::size_t v = 0; v < used_.size(); ++v) {
+      places.push_back(
+          {surface().vertices[v], normals[v], std::sqrt(elements_->surface_areas()[used_[v]])});
+    }
+    return places;
+  }
+
+  SolveSummary solve(std::span<const std::array<float, 3>> q,
+                     std::span<const Beam> beams,
+                     std::stop_token stop) override {
+    std::vector<Lanes<double>> load = elements_->load(on_mesh(q));
+    for (const Beam& beam : beams) {
+      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
+        for (int k = 0; k < 4; ++k) {
+          Lanes<double>& sum = load[mesh_.tets[d.tet][k]];
+          for (int c = 0; c < 3; ++c) sum.set(c, sum[c] + d.corners[c][k] * d.power[c]);
+        }
+      });
+    }
+    return solver_->solve(load, phi_, solve_options(), stop);
+  }
+
+  SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
+    const SurfaceLight all = elements_->surface_light(on_mesh(q), phi_);
+    SurfaceLight light{Values(used_.size()), Values(used_.size())};
+    for (std::size_t v = 0; v < used_.size(); ++v) {
+      light.fluence[v] = all.fluence[used_[v]];
+      light.net_flux[v] = all.net_flux[used_[v]];
+    }
+    return light;
+  }
+
+ private:
+  Values on_mesh(std::span<const std::array<float, 3>> q) const {
+    Values all(mesh_.vertices.size());
+    for (std::size_t v = 0; v < used_.size(); ++v) all[used_[v]] = q[v];
+    return all;
+  }
+
+  Boundary boundary_;
+  std::unique_ptr<FiniteElements> elements_;
+  std::unique_ptr<FreshHierarchy<double>> solver_;
+  std::vector<Lanes<double>> phi_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Subsurface>> make_elements_subsurface(TetMesh mesh,
+                                                             const SignedDistance& solid,
+                                                             const Subsurface::MaterialAt& material,
+                                                             const Boundary& boundary,
+                                                             const DiffusionOptions& options,
+                                                             ThreadTeam& team) {
+  auto made = std::make_unique<ElementsSubsurface>(std::move(mesh), options);
+  if (auto begun = made->begin_with(solid, material, boundary, team); !begun) return begun.error();
+  return std::unique_ptr<Subsurface>(std::move(made));
+}
+
+}  // namespace opaline::render

@@ -1,0 +1,160 @@
+#include "render/scene/graph_subsurface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/graph/nearest.h"
+#include "render/graph/two_point.h"
+#include "render/scene/fresh_hierarchy.h"
+#include "render/trace/vertex_values.h"
+
+namespace opaline::render {
+namespace {
+
+using reconstruct::diffusion::Boundary;
+using reconstruct::diffusion::SolveSummary;
+
+constexpr int kNearest = 4;
+constexpr double kSinglePrecision = 1e-5;  // of the residual; below it numbers are double
+
+template <class T, class Graph>
+class GraphSubsurface final : public Subsurface {
+ public:
+  GraphSubsurface(Graph graph,
+                  TetMesh mesh,
+                  const Boundary& boundary,
+                  const DiffusionOptions& options)
+      : Subsurface(std::move(mesh), options),
+        graph_(std::move(graph)),
+        diffusion_(graph_, boundary),
+        phi_(graph_.inner.size(), Lanes<T>::zero()) {}
+
+  Result<void> begin_with(const SignedDistance& solid,
+                          const MaterialAt& material,
+                          ThreadTeam& team) {
+    if (auto begun = begin(solid, material, team); !begun) return begun;
+    solver_ = std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, team);
+    if constexpr (kIsLattice) {
+      std::vector<Vec3> places;
+      for (const auto& node : graph_.surface) places.push_back(node.place);
+      to_vertices_ = nearest_interpolation(
+          places, surface().vertices, std::min<int>(kNearest, static_cast<int>(places.size())));
+    }
+    return ok();
+  }
+
+ protected:
+  Result<void> assemble() override {
+    if constexpr (!kIsLattice) update_geometry(mesh_, graph_);
+    auto taken = diffusion_.set_material(optics_);
+    if (taken && solver_) solver_->matrix_changed();
+    return taken;
+  }
+
+  std::vector<Vec3> nodes() const override { return graph_.inner; }
+
+  std::vector<SurfacePlace> flat_places() const override {
+    std::vector<SurfacePlace> places;
+    places.reserve(graph_.surface.size());
+    for (const auto& node : graph_.surface) {
+      places.push_back({node.place, node.normal, std::sqrt(2.0 * node.area)});
+    }
+    return places;
+  }
+
+  SolveSummary solve(std::span<const std::array<float, 3>> q,
+                     std::span<const Beam> beams,
+                     std::stop_token stop) override {
+    diffusion_.load(q, load_);
+    for (const Beam& beam : beams) {
+      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
+        for (int c = 0; c < 3; ++c) {
+          load_[d.tet].set(c, load_[d.tet][c] + static_cast<T>(d.power[c]));
+        }
+      });
+    }
+    return solver_->solve(load_, phi_, solve_options(), stop);
+  }
+
+  SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
+    const SurfaceLight light = diffusion_.surface_light(q, phi_);
+    if constexpr (kIsLattice) {
+      return {interpolated(light.fluence), interpolated(light.net_flux)};
+    } else {
+      return at_vertices(surface(), light);
+    }
+  }
+
+ private:
+  static constexpr bool kIsLattice = std::is_same_v<Graph, Polygrid>;
+
+  Values interpolated(const Values& of_nodes) const {
+    Values values(surface().vertices.size());
+    for (int v = 0; v < to_vertices_.rows(); ++v) {
+      for (int e = to_vertices_.starts[v]; e < to_vertices_.starts[v + 1]; ++e) {
+        for (int c = 0; c < 3; ++c) {
+          values[v][c] += to_vertices_.weights[e] * of_nodes[to_vertices_.columns[e]][c];
+        }
+      }
+    }
+    return values;
+  }
+
+  Graph graph_;
+  TwoPoint<T, Graph> diffusion_;
+  std::unique_ptr<FreshHierarchy<T>> solver_;
+  std::vector<Lanes<T>> load_;
+  std::vector<Lanes<T>> phi_;
+  Interpolation<float> to_vertices_;
+};
+
+template <class T, class Graph>
+Result<std::unique_ptr<Subsurface>> made_of(Graph graph,
+                                            TetMesh mesh,
+                                            const SignedDistance& solid,
+                                            const Subsurface::MaterialAt& material,
+                                            const Boundary& boundary,
+                                            const DiffusionOptions& options,
+                                            ThreadTeam& team) {
+  auto made = std::make_unique<GraphSubsurface<T, Graph>>(
+      std::move(graph), std::move(mesh), boundary, options);
+  if (auto begun = made->begin_with(solid, material, team); !begun) return begun.error();
+  return std::unique_ptr<Subsurface>(std::move(made));
+}
+
+template <class Graph>
+Result<std::unique_ptr<Subsurface>> of_precision(Graph graph,
+                                                 TetMesh mesh,
+                                                 const SignedDistance& solid,
+                                                 const Subsurface::MaterialAt& material,
+                                                 const Boundary& boundary,
+                                                 const DiffusionOptions& options,
+                                                 ThreadTeam& team) {
+  const auto make =
+      options.tolerance < kSinglePrecision ? made_of<double, Graph> : made_of<float, Graph>;
+  return make(std::move(graph), std::move(mesh), solid, material, boundary, options, team);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Subsurface>> make_graph_subsurface(TetMesh mesh,
+                                                          const SignedDistance& solid,
+                                                          const Subsurface::MaterialAt& material,
+                                                          const Boundary& boundary,
+                                                          const DiffusionOptions& options,
+                                                          ThreadTeam& team) {
+  QuadGraph graph = make_quad_graph(mesh);
+  return of_precision(std::move(graph), std::move(mesh), solid, material, boundary, options, team);
+}
+
+Result<std::unique_ptr<Subsurface>> make_polygrid_subsurface(Polygrid grid,
+                                                             TetMesh mesh,
+                                                             const SignedDistance& solid,
+                                                             const Subsurface::MaterialAt& material,
+                                                             const Boundary& boundary,
+                                                             const DiffusionOptions& options,
+                                                             ThreadTeam& team) {
+  return of_precision(std::move(grid), std::move(mesh), solid, material, boundary, options, team);
+}
+
+}  // namespace opaline::render
