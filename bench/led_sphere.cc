@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "bench/figure.h"
+#include "bench/led/blob_case.h"
 #include "bench/led/stage_case.h"
 #include "bench/led/tradeoff.h"
 #include "bench/stopwatch.h"
@@ -347,6 +348,7 @@ int main(int argc, char** argv) try {
   namespace bench = opaline::bench;
   std::int64_t paths = 2'000'000;
   bool tradeoff = false;
+  bool blobs = false;
   std::string plot;
   CLI::App app{
       "Scattering parameters from four pictures: errors, coverage, time.\n\nExample: scripts/bench "
@@ -355,15 +357,22 @@ int main(int argc, char** argv) try {
   app.add_flag("--tradeoff",
                tradeoff,
                "Only lamps, exposures, smoothing and estimator against error and time");
+  app.add_flag("--blobs", blobs, "Only smooth blobs, dents and two materials");
   app.add_option("--plot", plot, "With --tradeoff: an SVG file for the front");
   CLI11_PARSE(app, argc, argv);
   opaline::ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
   if (tradeoff) return bench::measure_tradeoff(std::min<std::int64_t>(paths, 500'000), plot, team);
+  const std::int64_t a_pixel = std::clamp<std::int64_t>(paths / 4000, 32, 4000);
+  if (blobs) {
+    bench::measure_blobs(team, a_pixel);
+    return 0;
+  }
   bench::measure_formulas();
   bench::measure_materials(team, paths);
   bench::measure_beams(team, std::min<std::int64_t>(paths, 500'000));
   bench::measure_noise(team, paths);
   bench::measure_stage(team, std::min<std::int64_t>(paths, 1'000'000));
+  bench::measure_blobs(team, a_pixel);
   bench::measure_extremes(team, std::min<std::int64_t>(paths, 300'000));
   bench::measure_time(team);
   return 0;

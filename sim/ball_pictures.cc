@@ -40,7 +40,10 @@ BallPictures draw_ball(const BallScene& scene, const BallLight& light) {
     p.measured[at] = 1;
     p.normal_x[at] = static_cast<float>(nx);
     p.normal_y[at] = static_cast<float>(ny);
-    const std::array<double, 3> normal{nx, ny, std::sqrt(1.0 - across)};
+    const double sine = std::sqrt(across);
+    const double tilted = std::asin(sine) + light.tilt * sine;
+    const double aside = sine > 0.0 ? std::sin(tilted) / sine : 0.0;
+    const std::array<double, 3> normal{nx * aside, ny * aside, std::cos(tilted)};
     for (std::size_t n = 0; n < 4; ++n) {
       const double clean = n == 0 ? constant : 0.5 * constant * (1.0 + normal[n - 1] / light.ratio);
       const double deviation = scene.noise * clean + 1e-9;

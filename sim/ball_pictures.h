@@ -26,7 +26,7 @@ struct BallScene {
 };
 
 /// Cross-polarised pictures under constant light and under (1 + omega_x)/2, (1 + omega_y)/2, (1 + omega_z)/2. A pixel's radiance is taken to be as
-/// its exitance.
+/// its exitance, its gradients' vector tilted (BallLight).
 struct BallPictures {
   int width = 0;
   int height = 0;

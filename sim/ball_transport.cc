@@ -16,6 +16,8 @@ constexpr std::int64_t kBatch = 4096;  // paths, each from its own stratum of th
 struct Sums {
   double constant = 0.0;
   double gradient = 0.0;
+  double aside = 0.0;  // towards the camera, times the sine of its angle
+  double along = 0.0;  // along the normal, times the sine's square
 };
 
 class Tracer {
@@ -34,6 +36,10 @@ class Tracer {
     if (!exit || exit->collisions < 2) return;
     sums.constant += exit->weight;
     sums.gradient += exit->weight * dot(light, exit->normal);
+    // Snell: the sine outside is the index times that inside, which is the length of what goes across
+    const Vec3 across = (exit->way - exit->normal * exit->cosine_inside) * ball_.ior;
+    sums.aside += exit->weight * dot(light, across);
+    sums.along += exit->weight * dot(light, exit->normal) * dot(across, across);
   }
 
  private:
@@ -61,8 +67,11 @@ BallLight summary(const std::vector<Sums>& batches) {
   for (const Sums& batch : batches) {
     mean.constant += batch.constant / count;
     mean.gradient += batch.gradient / count;
+    mean.aside += batch.aside / count;
+    mean.along += batch.along / count;
   }
-  BallLight light{mean.constant / kBatch, 0.0, mean.constant / mean.gradient, 0.0};
+  BallLight light{
+      mean.constant / kBatch, 0.0, mean.constant / mean.gradient, 0.0, -mean.aside / mean.along};
   double spread = 0.0;
   double ratio_spread = 0.0;
   for (const Sums& batch : batches) {

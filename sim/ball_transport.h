@@ -21,6 +21,9 @@ struct BallLight {
   double ratio =
       0.0;  ///< r: constant light over the gradient omega . n, n the normal where the light leaves
   double ratio_deviation = 0.0;
+  /// The gradients' vector leaves the normal, away from the camera, by tilt times the sine of the angle between them (fitted over all angles): a
+  /// slanted look sees light that came in aside (exit_light.h sorts it by angle).
+  double tilt = 0.0;
 };
 
 /// Monte Carlo in the ball: light enters one point from the hemisphere's directions omega (cosine law, stratified), refracts, walks with its

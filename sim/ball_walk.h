@@ -34,6 +34,7 @@ class BallWalk {
   struct Exit {
     double weight = 0.0;
     Vec3 normal;
+    Vec3 way;                    ///< before it refracts
     double cosine_inside = 1.0;  ///< of the angle to the normal, before it refracts
     int collisions = 0;
   };
@@ -60,7 +61,7 @@ class BallWalk {
         way = way + normal * (-2.0 * leaving);
         continue;
       }
-      return Exit{weight, normal, leaving, collisions};
+      return Exit{weight, normal, way, leaving, collisions};
     }
     return std::nullopt;
   }

@@ -9,7 +9,6 @@
 #include <optional>
 #include <thread>
 
-#include "sim/fresnel.h"
 #include "sim/options_check.h"
 #include "sim/sensor.h"
 
@@ -17,6 +16,16 @@ namespace opaline::sim {
 namespace {
 
 using std::numbers::pi;
+
+constexpr std::int64_t kTiltPaths = 200'000;
+
+/// A normal turned away from the camera by `tilt` times the sine of the angle between them.
+Vec3 turned_away(Vec3 normal, Vec3 to_camera, double tilt) {
+  const Vec3 across = to_camera - normal * dot(normal, to_camera);
+  const double sine = length(across);
+  if (sine < 1e-9) return normal;
+  return normal * std::cos(tilt * sine) - across * (std::sin(tilt * sine) / sine);
+}
 
 double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albedo)); }
 
@@ -30,17 +39,6 @@ std::optional<double> meet(Vec3 from, Vec3 way, const BallTruth& ball) {
   return along - std::sqrt(inside);
 }
 
-double ggx(double cosine, double alpha) {
-  const double a = alpha * alpha;
-  const double b = cosine * cosine * (a - 1.0) + 1.0;
-  return a / (pi * b * b);
-}
-
-double smith(double cosine, double alpha) {
-  const double tangent = (1.0 - cosine * cosine) / (cosine * cosine);
-  return 2.0 / (1.0 + std::sqrt(1.0 + alpha * alpha * tangent));
-}
-
 }  // namespace
 
 Result<void> validate(const LedSphereOptions& o, std::size_t lights) {
@@ -52,11 +50,15 @@ Result<void> validate(const LedSphereOptions& o, std::size_t lights) {
   for (std::size_t c = 0; c < 3; ++c) {
     check.within("reduced_albedo", o.reduced_albedo[c], 0.0, 0.99999);
     check.above("translucency", o.translucency_mm[c], 0.0);
+    check.within("second_reduced_albedo", o.second_reduced_albedo[c], 0.0, 0.99999);
+    check.above("second_translucency", o.second_translucency_mm[c], 0.0);
   }
   check.within("ior", o.ior, 1.0, 3.0).within("roughness", o.roughness, 0.02, 1.0);
   check.within("depolarised", o.depolarised, 0.0, 1.0);
   check.within("intensity_error", o.intensity_error, 0.0, 0.3);
   check.at_least("paths", static_cast<double>(o.paths), 10'000.0);
+  check.at_least("paths_per_pixel", static_cast<double>(o.paths_per_pixel), 16.0);
+  check.above("period", o.period_mm, 0.0).above("blur", o.blur_mm, 0.0);
   for (const int dead : o.dead_lights)
     check.within("dead_lights", dead, 0, static_cast<double>(lights) - 1.0);
   return check.result();
@@ -96,21 +98,25 @@ double diffusion_of(double reduced_albedo, double translucency_mm) {
   return decay(reduced_albedo) * translucency_mm / 3.0;
 }
 
+std::vector<SphereLight> true_lamps(const LedSphereOptions& options,
+                                    std::vector<SphereLight> lamps) {
+  for (std::size_t n = 0; n < lamps.size(); ++n) {
+    const double z = normal_quantile(uniform(mix(mix(options.seed, 0x6c656473), n)));
+    lamps[n].intensity *= std::max(0.0, 1.0 + options.intensity_error * z);
+  }
+  for (const int dead : options.dead_lights) lamps[static_cast<std::size_t>(dead)].intensity = 0.0;
+  return lamps;
+}
+
 LedSphere::LedSphere(const LedSphereOptions& options,
                      const std::vector<SphereLight>& lights,
                      const CameraOptics& camera)
     : options_(options),
-      lights_(lights),
+      lights_(true_lamps(options, lights)),
       balls_(balls_of(options)),
       width_(camera.model.width),
       height_(camera.model.height),
       psf_sigma_px_(camera.psf_sigma_px) {
-  for (std::size_t n = 0; n < lights_.size(); ++n) {
-    const double z = normal_quantile(uniform(mix(mix(options.seed, 0x6c656473), n)));
-    lights_[n].intensity *= std::max(0.0, 1.0 + options.intensity_error * z);
-  }
-  for (const int dead : options.dead_lights)
-    lights_[static_cast<std::size_t>(dead)].intensity = 0.0;
   look(camera);
 }
 
@@ -134,16 +140,23 @@ Result<std::unique_ptr<const LedSphere>> LedSphere::create(const LedSphereOption
   ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
   double done = 0.0;
   for (const BallTruth& ball : sphere->balls_) {
-    Table table{std::vector<float>(3 * (kSteps + 1)), {}};
+    Table table{std::vector<float>(3 * (kSteps + 1)), {}, {}};
     for (std::size_t c = 0; c < 3; ++c) {
       const double free_path = decay(options.reduced_albedo[c]) * options.translucency_mm[c];
-      auto traced =
-          trace_response({options.reduced_albedo[c], ball.radius_mm / free_path, options.ior},
-                         distance / ball.radius_mm,
-                         {.paths = options.paths},
-                         mix(options.seed, c),
-                         team,
-                         stop);
+      const Ball traced_ball{options.reduced_albedo[c], ball.radius_mm / free_path, options.ior};
+      auto slanted = trace_ball(traced_ball, kTiltPaths, mix(options.seed, c), team);
+      if (slanted && slanted->reflectance < 0.1)  // few paths come back, and they are short
+        slanted = trace_ball(traced_ball, 8 * kTiltPaths, mix(options.seed, c), team);
+      if (!slanted)
+        return slanted.error().in(fmt::format(
+            "ball of {} mm, translucency {} mm", ball.radius_mm, options.translucency_mm[c]));
+      table.tilt[c] = slanted->tilt;
+      auto traced = trace_response(traced_ball,
+                                   distance / ball.radius_mm,
+                                   {.paths = options.paths},
+                                   mix(options.seed, c),
+                                   team,
+                                   stop);
       if (!traced)
         return traced.error().in(fmt::format(
             "ball of {} mm, translucency {} mm", ball.radius_mm, options.translucency_mm[c]));
@@ -162,47 +175,37 @@ Result<std::unique_ptr<const LedSphere>> LedSphere::create(const LedSphereOption
   return std::unique_ptr<const LedSphere>(std::move(sphere));
 }
 
+MirrorSurface LedSphere::surface_at(const Seen& seen) const {
+  return {seen.point, seen.normal, seen.to_camera, options_.ior, options_.roughness};
+}
+
 /// `power` are I code/255.
 Rgb LedSphere::diffuse(const Seen& seen, const std::vector<double>& power) const {
   const Table& table = tables_[seen.ball];
   const Vec3 centre = balls_[seen.ball].centre;
   std::array<float, 3> sum{};
+  std::array<Vec3, 3> normals;
+  for (std::size_t c = 0; c < 3; ++c)
+    normals[c] = turned_away(seen.normal, seen.to_camera, table.tilt[c]);
   for (std::size_t n = 0; n < lights_.size(); ++n) {
     if (power[n] == 0.0) continue;
     const Vec3 to = lights_[n].position - centre;
     const double square = dot(to, to);
-    const double cosine = dot(to, seen.normal) / std::sqrt(square);
-    const double place = (cosine + 1.0) * (0.5 * kSteps);
-    const auto at = std::min(static_cast<std::size_t>(place), kSteps - 1);
-    const auto part = static_cast<float>(place - static_cast<double>(at));
     const auto weight = static_cast<float>(power[n] / square);
-    const float* entry = &table.exitance[3 * at];
-    for (std::size_t c = 0; c < 3; ++c)
-      sum[c] += weight * (entry[c] + part * (entry[c + 3] - entry[c]));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double cosine = dot(to, normals[c]) / std::sqrt(square);
+      const double place = (cosine + 1.0) * (0.5 * kSteps);
+      const auto at = std::min(static_cast<std::size_t>(std::max(0.0, place)), kSteps - 1);
+      const auto part = static_cast<float>(place - static_cast<double>(at));
+      const float* entry = &table.exitance[3 * at + c];
+      sum[c] += weight * (entry[0] + part * (entry[3] - entry[0]));
+    }
   }
   Rgb radiance{};
   const double cosine = dot(seen.normal, seen.to_camera);
   for (std::size_t c = 0; c < 3; ++c)
     radiance[c] = options_.depolarised / pi * table.responses[c].law_at(cosine) * sum[c];
   return radiance;
-}
-
-double LedSphere::specular(const Seen& seen, const std::vector<double>& power) const {
-  const double out = dot(seen.normal, seen.to_camera);
-  double sum = 0.0;
-  for (std::size_t n = 0; n < lights_.size(); ++n) {
-    const Vec3 to = lights_[n].position - seen.point;
-    const double square = dot(to, to);
-    const Vec3 way = to * (1.0 / std::sqrt(square));
-    const double in = dot(seen.normal, way);
-    if (in <= 0.0 || out <= 0.0 || power[n] == 0.0) continue;
-    const Vec3 half = normalized(way + seen.to_camera);
-    const double fresnel = reflectance(std::min(1.0, dot(half, way)), 1.0, options_.ior);
-    const double alpha = options_.roughness;
-    sum += power[n] / square * fresnel * ggx(dot(half, seen.normal), alpha) * smith(in, alpha) *
-           smith(out, alpha) / (4.0 * out);
-  }
-  return sum;
 }
 
 StationLight LedSphere::light(const Image<std::uint8_t>& codes) const {
@@ -216,7 +219,7 @@ StationLight LedSphere::light(const Image<std::uint8_t>& codes) const {
   const bool parallel = codes.at(static_cast<int>(lights_.size()), 0) != 0;
   for (const Seen& seen : seen_) {
     const Rgb radiance = diffuse(seen, power);
-    const double mirrored = parallel ? specular(seen, power) : 0.0;
+    const double mirrored = parallel ? mirrored_lamps(lights_, power, surface_at(seen)) : 0.0;
     float* const pixel = &light.surface_radiance.samples()[3 * std::size_t{seen.pixel}];
     for (std::size_t c = 0; c < 3; ++c) pixel[c] = static_cast<float>(radiance[c] + mirrored);
   }

@@ -12,6 +12,8 @@
 #include "base/light_sphere.h"
 #include "base/result.h"
 #include "sim/ball_response.h"
+#include "sim/blob_walk.h"
+#include "sim/lamp_mirror.h"
 #include "sim/station_light.h"
 
 namespace opaline::sim {
@@ -32,6 +34,14 @@ struct LedSphereOptions {
   std::vector<int> dead_lights;  ///< by number from 0
   std::uint64_t seed = 1;
   std::int64_t paths = 1'000'000;  ///< of each ball and channel
+  /// In place of the balls one body of this name (blob.h) and of the only radius in radii_mm; see led_blob.h for what follows.
+  std::string body;
+  std::int64_t paths_per_pixel = 256;  ///< of each channel; >= 16
+  BlobMixture mixture = BlobMixture::kNone;
+  Rgb second_reduced_albedo{0.97, 0.93, 0.9};
+  Rgb second_translucency_mm{1.2, 0.9, 0.7};
+  double period_mm = 10.0;  ///< of bands, > 0
+  double blur_mm = 1.0;     ///< of the step between halves, > 0
 };
 /// Errors: kInvalidArgument. `lights` is how many there are.
 Result<void> validate(const LedSphereOptions& options, std::size_t lights);
@@ -53,14 +63,18 @@ std::optional<SeenBall> see_ball(const std::vector<BallTruth>& balls,
                                  const CameraModel& camera,
                                  double x,
                                  double y);
+/// The lamps as they truly are: with their errors, and the dead ones dark.
+std::vector<SphereLight> true_lamps(const LedSphereOptions& options,
+                                    std::vector<SphereLight> lamps);
 double diffusion_of(double reduced_albedo,
                     double translucency_mm);  ///< D = l_d sqrt(3 (1 - alpha')) / 3, mm
 
 /// From codes of a light stage (drivers/stage_picture.h) to the camera's pixels. With u and d the direction and distance from a ball's
 /// centre to a light of intensity I at `code`, n a pixel's normal, mu the cosine to the camera, and E, h a traced BallResponse,
 ///
-///   L = depolarised h(mu) / pi sum_lights code/255 I / d^2 E(n . u)
+///   L = depolarised h(mu) / pi sum_lights code/255 I / d^2 E(n' . u)
 ///
+/// n' being n turned away from the camera by BallLight::tilt times the sine of their angle,
 /// and with the polarisers parallel, added to it, the surface's reflection of every light after Cook and Torrance (GGX's distribution of
 /// normals, Smith's shadowing, Fresnel). Pixels are sampled at their centres, then blurred by the camera's PSF. In RigTruth, `patches` are the
 /// lights' irradiances in the middle, `surface_radiance` what the pixels see before the PSF.
@@ -87,13 +101,14 @@ class LedSphere : public LightPath {
   struct Table {
     std::vector<float> exitance;  // kSteps + 1 times 3 channels
     std::array<BallResponse, 3> responses;
+    std::array<double, 3> tilt{};
   };
   LedSphere(const LedSphereOptions& options,
             const std::vector<SphereLight>& lights,
             const CameraOptics& camera);
   void look(const CameraOptics& camera);
   Rgb diffuse(const Seen& seen, const std::vector<double>& power) const;
-  double specular(const Seen& seen, const std::vector<double>& power) const;
+  MirrorSurface surface_at(const Seen& seen) const;
 
   LedSphereOptions options_;
   std::vector<SphereLight> lights_;  // as they truly are

@@ -23,11 +23,11 @@ constexpr double kReadNoise = 3.0;
 constexpr double kSettle = 0.25;  // s, a pattern
 constexpr int kEdge = 2;          // pixels along the outline that are left out
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, values.begin() + at);
+  return values[static_cast<std::size_t>(at)];
 }
 
 }  // namespace
@@ -48,9 +48,16 @@ StageCase::StageCase(const StageScene& scene) : scene_(scene) {
   options.dead_lights = scene.dead_lamps;
   options.intensity_error = scene.intensity_error;
   options.seed = scene.seed;
-  balls_ = sim::balls_of(options);
-  const double right = balls_.back().centre.x + balls_.back().radius_mm;
-  const double tall = *std::ranges::max_element(scene.radii_mm);
+  options.body = scene.body;
+  options.paths_per_pixel = scene.paths_per_pixel;
+  options.mixture = scene.mixture;
+  options.second_reduced_albedo.fill(scene.second_reduced_albedo);
+  options.second_translucency_mm.fill(scene.second_translucency_mm);
+  truth_ = *sim::LedTruth::create(options);
+  const auto balls = sim::balls_of(options);
+  const auto& blob = truth_->blob();
+  const double right = blob ? blob->outer_mm() : balls.back().centre.x + balls.back().radius_mm;
+  const double tall = blob ? blob->outer_mm() : *std::ranges::max_element(scene.radii_mm);
   CameraModel& model = camera_.model;
   model.width = 2 * static_cast<int>(right / scene.pixel_mm + 8.0);
   model.height = 2 * static_cast<int>(tall / scene.pixel_mm + 8.0);
@@ -65,9 +72,11 @@ StageCase::StageCase(const StageScene& scene) : scene_(scene) {
   record_.pixel_mm = scene.pixel_mm;
   record_.distance_mm = 1000.0;
   NullSink events;
-  auto made = sim::LedSphere::create(options, record_.lights, camera_, events, {});
+  auto made = sim::make_led_object(options, record_.lights, camera_, events, {});
   ENSURE(made);
   sphere_ = *std::move(made);
+  if (const auto* traced = dynamic_cast<const sim::LedBlob*>(sphere_.get()))
+    path_noise_ = traced->path_noise();
   for (const int dead : scene.dead_lamps)
     if (scene.dead_are_known) record_.lights[static_cast<std::size_t>(dead)].intensity = 0.0;
 }
@@ -107,7 +116,8 @@ StagePictures StageCase::photograph(const StageShot& shot) const {
           (electrons + kReadNoise * kReadNoise) / shot.frames * per_electron * per_electron;
       picture.radiance.push_back(
           static_cast<float>(clean[at] + std::sqrt(variance) * gaussian(random)));
-      picture.variance.push_back(static_cast<float>(variance));
+      const double of_paths = path_noise_ * clean[at];
+      picture.variance.push_back(static_cast<float>(variance + of_paths * of_paths));
       if (shot.clip > 0.0 && pattern.name == "gradient_x" && clean[at] > shot.clip * brightest)
         clipped[at] = 1;
     }
@@ -128,8 +138,7 @@ StagePictures StageCase::photograph(const StageShot& shot) const {
     for (int x = 0; x < p.width; ++x) {
       bool inside = true;
       for (const auto& [dx, dy] : {std::pair{-kEdge, 0}, {kEdge, 0}, {0, -kEdge}, {0, kEdge}})
-        inside =
-            inside && sim::see_ball(balls_, camera_.model, x + 0.5 + dx, y + 0.5 + dy).has_value();
+        inside = inside && truth_->at(camera_.model, x + 0.5 + dx, y + 0.5 + dy).has_value();
       const std::size_t at = static_cast<std::size_t>(y) * p.width + x;
       p.measured.push_back(!inside            ? reconstruct::kNotSeen
                            : clipped[at] != 0 ? reconstruct::kClipped
@@ -150,6 +159,7 @@ reconstruct::ScatteringMaps StageCase::estimate(const StagePictures& pictures,
   for (int half = 2; half <= shot.largest_window; half *= 2) options.half_windows.push_back(half);
   options.ratio_deviation = shot.lamp_deviation / std::sqrt(0.25 * scene_.lamps);
   options.reflectance_deviation = 0.005;
+  options.ior = shot.ior;
   if (shot.ior_deviation > 0.0) {
     options.lower_index = &*lower;
     options.higher_index = &*higher;
@@ -166,11 +176,13 @@ StageErrors StageCase::errors(const StagePictures& pictures,
   StageErrors e;
   std::vector<double> offs;
   std::vector<double> stated;
+  std::vector<double> relative;
+  std::vector<double> scattered;
   double pixels = 0.0;
   for (int y = 0; y < maps.height; ++y)
     for (int x = 0; x < maps.width; ++x) {
       const std::size_t at = static_cast<std::size_t>(y) * maps.width + x;
-      const auto seen = sim::see_ball(balls_, camera_.model, x + 0.5, y + 0.5);
+      const auto seen = truth_->at(camera_.model, x + 0.5, y + 0.5);
       if (pictures.measured[at] == reconstruct::kNotSeen || !seen) continue;
       pixels += 1.0;
       e.reasons[static_cast<std::size_t>(maps.left_out[at])] += 1.0;
@@ -180,11 +192,14 @@ StageErrors StageCase::errors(const StagePictures& pictures,
       if (pictures.measured[at] == reconstruct::kMeasured)
         e.normal_deg += std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
       if (maps.left_out[at] != LeftOut::kFound) continue;
-      const double off = std::log(maps.diffusion[at] / diffusion());
+      const double off = std::log(maps.diffusion[at] / seen->diffusion_mm[1]);
+      const double scattering = seen->reduced_albedo[1] / (3.0 * seen->diffusion_mm[1]);
+      relative.push_back(std::abs(std::expm1(off)));
+      scattered.push_back(std::abs(maps.reduced_scattering[at] / scattering - 1.0));
       offs.push_back(off);
       stated.push_back(maps.log_diffusion_deviation[at]);
       e.error += off * off;
-      e.albedo_error += std::abs(maps.reduced_albedo[at] / scene_.reduced_albedo - 1.0);
+      e.albedo_error += std::abs(maps.reduced_albedo[at] / seen->reduced_albedo[1] - 1.0);
       (std::abs(off) < 2.0 * stated.back() ? e.coverage : e.wrong) += 1.0;
     }
   const double found = std::max<double>(1.0, static_cast<double>(offs.size()));
@@ -195,8 +210,10 @@ StageErrors StageCase::errors(const StagePictures& pictures,
   e.found = static_cast<double>(offs.size()) / pixels;
   e.normal_deg /= std::max(1.0, pixels - e.reasons[static_cast<std::size_t>(LeftOut::kSaturated)]);
   for (double& share : e.reasons) share /= pixels;
-  e.bias = median(std::move(offs));
-  e.stated = median(std::move(stated));
+  e.bias = quantile(std::move(offs), 0.5);
+  e.stated = quantile(std::move(stated), 0.5);
+  e.error_90 = quantile(std::move(relative), 0.9);
+  e.scattering_error_90 = quantile(std::move(scattered), 0.9);
   return e;
 }
 

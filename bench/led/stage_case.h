@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,7 @@
 #include "base/thread_team.h"
 #include "reconstruct/spherical_gradient/scattering_maps.h"
 #include "reconstruct/spherical_gradient/stage_correction.h"
-#include "sim/led_sphere.h"
+#include "sim/led_blob.h"
 
 namespace opaline::bench {
 
@@ -19,6 +20,11 @@ namespace opaline::bench {
 struct StageScene {
   int lamps = 156;
   std::vector<double> radii_mm{10.0, 6.0};
+  std::string body;  ///< in place of the balls, of the only radius (sim/blob.h)
+  std::int64_t paths_per_pixel = 512;
+  sim::BlobMixture mixture = sim::BlobMixture::kNone;  ///< with a second material
+  double second_reduced_albedo = 0.93;
+  double second_translucency_mm = 1.0;
   double reduced_albedo = 0.96;
   double translucency_mm = 1.4;
   double ior = 1.4;
@@ -52,8 +58,10 @@ struct StageErrors {
   double wrong = 0.0;         ///< share of the pixels that have one beyond two stated deviations
   double normal_deg = 0.0;    ///< mean
   double albedo_error = 0.0;  ///< mean of |alpha' - truth| over the truth
-  double seconds = 0.0;       ///< of computing
-  std::array<double, 8> reasons{};  ///< share of the pixels by LeftOut
+  double error_90 = 0.0;      ///< |D over the truth - 1| that nine tenths of the answers keep to
+  double scattering_error_90 = 0.0;  ///< the same of sigma_s'
+  double seconds = 0.0;              ///< of computing
+  std::array<double, 8> reasons{};   ///< share of the pixels by LeftOut
 };
 
 /// The lamp nearest to a direction.
@@ -72,7 +80,9 @@ class StageCase {
                      const reconstruct::ScatteringMaps& maps) const;
   StageErrors run(const StageShot& shot, ThreadTeam& team) const;
   const StageRecord& record() const { return record_; }
-  double diffusion() const;  ///< the truth, mm
+  double diffusion() const;  ///< the truth of the first material, mm
+  const sim::LedTruth& truth() const { return *truth_; }
+  const sim::CameraOptics& camera() const { return camera_; }
   /// Simulated seconds of a capture by the camera of sim/optics.h: exposures, and 0.25 s for each pattern to settle.
   double capture_seconds(const StageShot& shot) const;
 
@@ -82,8 +92,9 @@ class StageCase {
   StageScene scene_;
   StageRecord record_;
   sim::CameraOptics camera_;
-  std::unique_ptr<const sim::LedSphere> sphere_;
-  std::vector<sim::BallTruth> balls_;
+  std::unique_ptr<const sim::LightPath> sphere_;
+  std::optional<sim::LedTruth> truth_;
+  double path_noise_ = 0.0;  // of light traced from pixels; the stated variances have it
 };
 
 }  // namespace opaline::bench

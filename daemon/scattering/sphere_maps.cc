@@ -62,6 +62,7 @@ reconstruct::MapOptions map_options(const config::LedSphereOptions& o, std::size
   // A quarter of the lamps makes most of a pixel's light, and what they are wrong by is theirs alone.
   options.ratio_deviation = o.lamp_deviation / std::sqrt(0.25 * static_cast<double>(lamps));
   options.reflectance_deviation = o.white_deviation;
+  options.ior = o.ior;
   return options;
 }
 

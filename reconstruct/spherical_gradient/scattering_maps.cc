@@ -14,6 +14,12 @@ namespace {
 /// (tests/reconstruct/spherical_gradient/ball_table_test.cc).
 constexpr double kTableDeviation = 0.02;
 
+/// The tilt that a camera's slanted look makes, as a depth in mean free paths, and what of it is not known (tests/reconstruct/spherical_gradient/camera_tilt_test.cc).
+constexpr double kTiltDepth = 1.0;
+constexpr double kTiltDeviation = 0.2;
+/// Deviations below zero that make a curvature negative for sure: small windows are noisy, and there are many of them.
+constexpr double kSureConcave = 4.0;
+
 Result<void> check(const GradientPictures& p, const MapOptions& options) {
   if (p.width < 1 || p.height < 1)
     return invalid_argument(fmt::format("pictures of {} x {} pixels", p.width, p.height));
@@ -38,8 +44,11 @@ Result<void> check(const GradientPictures& p, const MapOptions& options) {
       !std::is_sorted(options.half_windows.begin(), options.half_windows.end()) ||
       options.half_windows.front() < 1 || options.half_windows.back() > 1000)
     return invalid_argument("half windows; expected 1 to 1000 pixels, in rising order");
-  if (!(options.certain > 0.0 && options.sigmas >= 0.0 && options.normal_certain > 0.0))
-    return invalid_argument("certainty and sigmas; expected > 0");
+  if (!(options.certain > 0.0 && options.sigmas >= 0.0 && options.normal_certain > 0.0 &&
+        options.agree > 0.0))
+    return invalid_argument("certainty, agreement and sigmas; expected > 0");
+  if (!(options.ior >= 1.0 && options.ior <= 3.0))
+    return invalid_argument(fmt::format("refractive index {}; expected 1 to 3", options.ior));
   if (!(options.ratio_deviation >= 0.0 && options.reflectance_deviation >= 0.0))
     return invalid_argument("deviations; expected at least 0");
   return ok();
@@ -160,7 +169,22 @@ void put_normal(const WindowValues& w, std::size_t at, ScatteringMaps& maps) {
   maps.normal_z[at] = static_cast<float>(std::sqrt(1.0 - across));
 }
 
-/// The smallest window of every pixel that is certain enough, or the largest one; normals by the first that is certain of them.
+bool is_surely_concave(const WindowValues& w) {
+  return w.count >= 6 && w.curvature < 0.0 &&
+         w.curvature * w.curvature > kSureConcave * kSureConcave * w.curvature_variance;
+}
+
+/// Whether a larger window sees what the smaller one saw: where it does not, the object changes within it.
+bool agrees(const WindowValues& larger, const WindowValues& smaller, double sigmas) {
+  if (smaller.count < 6) return true;
+  const double bend = larger.curvature - smaller.curvature;
+  const double ratio = larger.ratio - smaller.ratio;
+  const double square = sigmas * sigmas;
+  return bend * bend <= square * smaller.curvature_variance &&
+         ratio * ratio <= square * smaller.ratio_variance;
+}
+
+/// The smallest window of every pixel that is certain enough or certainly concave, or the largest one that agrees with the ones before; normals by the first that is certain of them.
 std::vector<WindowValues> choose_windows(const PixelValues& values,
                                          const FlatRatios& flat,
                                          const MapOptions& options,
@@ -178,8 +202,13 @@ std::vector<WindowValues> choose_windows(const PixelValues& values,
             window.normal_variance < options.normal_certain * options.normal_certain ? 1 : 0;
       }
       if (done[at] != 0) return;
+      if (!agrees(window, chosen[at], options.agree)) {
+        done[at] = 1;
+        return;
+      }
       chosen[at] = window;
-      done[at] = is_certain(window, flat.at(window.reflectance), options.certain) ? 1 : 0;
+      const double flat_ratio = flat.at(window.reflectance);
+      done[at] = is_certain(window, flat_ratio, options.certain) || is_surely_concave(window);
     });
   return chosen;
 }
@@ -235,6 +264,24 @@ IndexSpread index_spread(const WindowValues& w, const MapOptions& options) {
   return {LeftOut::kFound, decay + 0.5 * std::log(high.curvature / low.curvature), decay};
 }
 
+/// By how much the camera's slanted look makes a pixel's curvature too large, as a factor: `shift` is c of the header, `cosine` that of the normal found.
+double curvature_by_tilt(double shift, double cosine) {
+  constexpr double kRim = 0.5;  // beyond, windows see little of what bends most
+  const double mu = std::clamp(cosine, kRim, 1.0);
+  return std::max(0.5, 1.0 + shift * (mu - 0.5 * (1.0 - mu * mu) / mu));
+}
+
+/// Turns a pixel's normal back towards the camera.
+void take_out_tilt(double shift, std::size_t at, ScatteringMaps& maps) {
+  const double across = std::hypot(maps.normal_x[at], maps.normal_y[at]);
+  if (!(across > 0.0 && across < 1.0)) return;
+  const double turned = std::sin(std::asin(across) - shift * across);
+  const double scale = std::max(0.0, turned) / across;
+  maps.normal_x[at] = static_cast<float>(scale * maps.normal_x[at]);
+  maps.normal_y[at] = static_cast<float>(scale * maps.normal_y[at]);
+  maps.normal_z[at] = static_cast<float>(std::sqrt(1.0 - turned * turned));
+}
+
 void estimate_pixel(const WindowValues& w,
                     double pixel_mm,
                     const BallTable& table,
@@ -250,8 +297,12 @@ void estimate_pixel(const WindowValues& w,
   if (index.reason != LeftOut::kFound) return;
   const double ratio_noise = ratio_variance(w, table, options);
   const double reflectance_noise = reflectance_variance(w, options);
-  const double curvature = w.curvature / pixel_mm;
   const double g = std::sqrt(3.0 * (1.0 - found.reduced_albedo));
+  const double shift = kTiltDepth * g * found.curvature / options.ior;  // 3 D H / ior, times that
+  const double by_tilt = curvature_by_tilt(shift, maps.normal_z[at]);
+  const double curvature = w.curvature / pixel_mm / by_tilt;
+  take_out_tilt(shift, at, maps);
+  maps.curvature[at] = static_cast<float>(curvature);
   const double translucency = found.curvature / curvature;
   const double diffusion = g * translucency / 3.0;
   const auto& s = found.sensitivity;
@@ -260,6 +311,7 @@ void estimate_pixel(const WindowValues& w,
   const double log_variance =
       by_reflectance * by_reflectance * reflectance_noise + by_ratio * by_ratio * ratio_noise +
       w.curvature_variance / (w.curvature * w.curvature) + kTableDeviation * kTableDeviation +
+      kTiltDeviation * kTiltDeviation * (by_tilt - 1.0) * (by_tilt - 1.0) +
       index.log_diffusion * index.log_diffusion;
   const double decay_variance = s[0] * s[0] * reflectance_noise + s[1] * s[1] * ratio_noise +
                                 index.log_decay * index.log_decay;

@@ -48,6 +48,9 @@ std::string_view to_string(LeftOut reason);  ///< "found", "not measured", "too 
 struct MapOptions {
   std::vector<int> half_windows{
       2, 4, 8, 16, 32};  ///< pixels; the smallest that is certain enough is taken
+  /// A larger window's curvature and ratio must lie within so many deviations of the smaller one's, or that one is kept, however uncertain: the object
+  /// bends or changes within the larger (intersection of confidence intervals, Goldenshluger & Nemirovski 1997).
+  double agree = 3.0;
   double certain =
       0.05;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
   double sigmas = 2.0;  ///< of what is called certain in LeftOut
@@ -56,6 +59,7 @@ struct MapOptions {
   double ratio_deviation =
       0.0;  ///< relative, of r, that all pixels share: how well the lamps are known
   double reflectance_deviation = 0.0;  ///< the same of the reflectance: lamps, white, exit law
+  double ior = 1.4;                    ///< 1 to 3; of the tilt below
   /// Tables of the lowest and the highest index that the object may have, which must outlive the call; none: the index is known. Half of what
   /// they make of ln D and alpha' counts as a deviation, and a pixel that has an answer in one only is left out.
   const BallTable* lower_index = nullptr;
@@ -81,6 +85,14 @@ struct ScatteringMaps {
 
 /// Scattering parameters of every pixel (Zhu et al. 2013, by traced balls instead of the dipole: ball_table.h). Normals after Ma et al. 2007, from
 /// the pictures with half of the constant one taken away; noise of the pictures is carried to the results.
+///
+/// A camera that looks aslant sees light that came in aside of where it looks, as if one mean free path deep along its refracted ray, so on a surface of
+/// mean curvature H the gradients' vector is tilted away from the camera, theta the angle between them, by
+///
+///   delta = c sin(theta),   c = H / (sigma_t' ior) = 3 D H / ior     (within 20 % of Monte Carlo: tests/.../camera_tilt_test.cc)
+///
+/// which makes curvature too large by 1 + c (cos theta - sin^2 theta / (2 cos theta)) on a ball. Both are taken out where D is found; a fifth of the latter
+/// is in the deviation.
 ///
 /// Errors: kInvalidArgument where sizes or numbers do not fit.
 Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,

@@ -47,7 +47,8 @@ TEST(ScatteringMaps, FindABallsMaterial) {
   const ScatteringMaps maps = estimate(pictures(scene, traced(scene)));
   const std::size_t at = middle_of(maps);
   ASSERT_EQ(maps.left_out[at], LeftOut::kFound);
-  EXPECT_NEAR(maps.curvature[at], 0.1, 1e-4);
+  // a fifth of 3 D H / ior is not known (camera_tilt_test.cc)
+  EXPECT_NEAR(maps.curvature[at], 0.1, 0.2 * 0.1 * 3.0 * scene.diffusion() * 0.1 / 1.4);
   EXPECT_NEAR(maps.reduced_albedo[at], 0.95, 0.02 * 0.95);
   EXPECT_NEAR(maps.diffusion[at], scene.diffusion(), 0.05 * scene.diffusion());
   EXPECT_NEAR(maps.translucency[at], 1.5, 0.05 * 1.5);
