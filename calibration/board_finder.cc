@@ -17,8 +17,10 @@ namespace {
 constexpr int kMostSquares = 100;
 constexpr double kIgnored = 0.001;  // of samples, at either end of the range
 constexpr int kRefineSteps = 60;
-constexpr double kRefined = 1e-4;  // px
-constexpr double kWindowShare = 0.3;
+constexpr double kRefined = 1e-4;     // px
+constexpr double kWindowShare = 0.3;  // of the corners' distance
+constexpr double kClear = 0.9;        // of the paper between a square's edge and its marker
+constexpr double kClearOfBlur = 0.5;
 constexpr int kLargestWindow = 11;
 constexpr int kFewestCorners = 8;
 constexpr double kProfileShare = 0.45;
@@ -82,8 +84,14 @@ double spacing_of(const Found& found, const Board& board) {
   return least;
 }
 
-void refine(const cv::Mat& picture, double spacing, Points& points) {
-  const int half = std::clamp(static_cast<int>(kWindowShare * spacing), 2, kLargestWindow);
+// How far from an edge there is nothing but it, over the corners' distance.
+double clear_of(const Board& board, double most, double clear) {
+  if (board.kind == Board::Kind::kChessboard) return most;
+  return std::min(most, 0.5 * clear * (1.0 - board.marker_mm / board.square_mm));
+}
+
+void refine(const cv::Mat& picture, double clear, Points& points) {
+  const int half = std::clamp(static_cast<int>(clear), 2, kLargestWindow);
   cv::cornerSubPix(picture,
                    points,
                    {half, half},
@@ -109,12 +117,15 @@ struct Edge {
 };
 
 // The profile across the edge that two neighbouring corners end.
-std::optional<Edge> edge_between(const cv::Mat& picture, cv::Point2f a, cv::Point2f b) {
+std::optional<Edge> edge_between(const cv::Mat& picture,
+                                 cv::Point2f a,
+                                 cv::Point2f b,
+                                 double share) {
   const cv::Point2f along = b - a;
   const double span = cv::norm(along);
   const double nx = -along.y / span;
   const double ny = along.x / span;
-  const double reach = kProfileShare * span;
+  const double reach = share * span;
   double weight = 0.0;
   double first = 0.0;
   double second = 0.0;
@@ -144,7 +155,8 @@ void measure_edges(const cv::Mat& picture,
       const int apart = found.ids[b] - found.ids[a];
       const bool is_beside = apart == 1 && found.ids[b] % board.columns() != 0;
       if (!is_beside && apart != board.columns()) continue;
-      const auto edge = edge_between(picture, found.points[a], found.points[b]);
+      const auto edge = edge_between(
+          picture, found.points[a], found.points[b], clear_of(board, kProfileShare, kClearOfBlur));
       if (!edge) continue;
       variances.push_back(edge->variance);
       contrasts.push_back(edge->contrast);
@@ -170,7 +182,7 @@ BoardView view_of(const cv::Mat& picture, const Board& board, const std::string&
     return view;
   }
   const double spacing = spacing_of(*found, board);
-  refine(picture, spacing, found->points);
+  refine(picture, clear_of(board, kWindowShare, kClear) * spacing, found->points);
   measure_edges(picture, board, *found, view);
   for (std::size_t i = 0; i < found->ids.size(); ++i)
     view.corners.push_back({found->ids[i], {found->points[i].x + 0.5, found->points[i].y + 0.5}});
@@ -226,13 +238,19 @@ Result<BoardView> find_board(const Image<std::uint8_t>& grey,
 }
 
 Image<std::uint8_t> grey_of(const Image<std::uint16_t>& picture) {
+  Image<float> light(picture.width(), picture.height(), picture.channels());
+  std::ranges::copy(picture.samples(), light.samples().begin());
+  return grey_of(light);
+}
+
+Image<std::uint8_t> grey_of(const Image<float>& picture) {
   const auto channels = static_cast<std::size_t>(picture.channels());
-  std::vector<float> mean(picture.pixel_count());
+  std::vector<float> sum(picture.pixel_count());
   for (std::size_t i = 0; i < picture.samples().size(); ++i)
-    mean[i / channels] += static_cast<float>(picture.samples()[i]);
+    sum[i / channels] += picture.samples()[i];
   Image<std::uint8_t> grey(picture.width(), picture.height(), 1);
-  if (mean.empty()) return grey;
-  std::vector<float> sorted = mean;
+  if (sum.empty()) return grey;
+  std::vector<float> sorted = sum;
   const auto ignored = static_cast<std::ptrdiff_t>(kIgnored * static_cast<double>(sorted.size()));
   const auto low = sorted.begin() + ignored;
   std::ranges::nth_element(sorted, low);
@@ -240,9 +258,9 @@ Image<std::uint8_t> grey_of(const Image<std::uint16_t>& picture) {
   const auto high = sorted.end() - 1 - ignored;
   std::ranges::nth_element(sorted, high);
   const float scale = *high > dark ? 255.0f / (*high - dark) : 0.0f;
-  for (std::size_t i = 0; i < mean.size(); ++i) {
+  for (std::size_t i = 0; i < sum.size(); ++i) {
     grey.samples()[i] =
-        static_cast<std::uint8_t>(std::lround(std::clamp((mean[i] - dark) * scale, 0.0f, 255.0f)));
+        static_cast<std::uint8_t>(std::lround(std::clamp((sum[i] - dark) * scale, 0.0f, 255.0f)));
   }
   return grey;
 }

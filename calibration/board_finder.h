@@ -28,5 +28,6 @@ Result<void> validate(const Board& board);
 /// A picture of any range as one of 256 greys: the darkest and the brightest 0.1 % of samples become 0 and 255, in between it
 /// is linear. Mean of the channels.
 Image<std::uint8_t> grey_of(const Image<std::uint16_t>& picture);
+Image<std::uint8_t> grey_of(const Image<float>& picture);
 
 }  // namespace opaline::calibration

@@ -69,7 +69,7 @@ std::optional<Homography> fit_homography(std::span<const PlanePair> pairs) {
   return out;
 }
 
-CameraModel::Pixel apply(const Homography& h, CameraModel::Pixel from) {
+CameraModel::Pixel carry(const Homography& h, CameraModel::Pixel from) {
   const double w = h[6] * from.x + h[7] * from.y + h[8];
   return {(h[0] * from.x + h[1] * from.y + h[2]) / w, (h[3] * from.x + h[4] * from.y + h[5]) / w};
 }

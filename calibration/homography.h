@@ -21,6 +21,6 @@ struct PlanePair {
 /// the algebraic distance. None where the points do not determine one.
 std::optional<Homography> fit_homography(std::span<const PlanePair> pairs);
 
-CameraModel::Pixel apply(const Homography& h, CameraModel::Pixel from);
+CameraModel::Pixel carry(const Homography& h, CameraModel::Pixel from);
 
 }  // namespace opaline::calibration

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <numbers>
 #include <utility>
 
 namespace opaline::calibration {
@@ -103,6 +104,19 @@ bool leave_out(std::vector<ViewFit>& views, const LensFitOptions& options, const
     any = true;
   }
   return any;
+}
+
+std::vector<double> typical_rms(const Kept& kept, const BundleSummary& summary, int lens) {
+  std::vector<std::vector<double>> distances(kept.view.size());
+  for (std::size_t i = 0; i < summary.distance_px.size(); ++i) {
+    const Sighting& s = kept.bundle.sightings[i];
+    if (s.lens == lens)
+      distances[static_cast<std::size_t>(s.view)].push_back(summary.distance_px[i]);
+  }
+  std::vector<double> rms;
+  for (std::vector<double>& view : distances)
+    rms.push_back(std::numbers::sqrt2 / kMedianOfRayleigh * median_of(std::move(view)));
+  return rms;
 }
 
 int drop_outliers(

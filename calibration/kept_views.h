@@ -44,6 +44,8 @@ Kept kept_of(const CameraModel& lens,
              const Counts& counts);
 /// Names the views that do not fit; whether there are new ones.
 bool leave_out(std::vector<ViewFit>& views, const LensFitOptions& options, const char* what);
+/// What the RMS of each of the bundle's views would be without the corners that are far off: from the median of their distances.
+std::vector<double> typical_rms(const Kept& kept, const BundleSummary& summary, int lens);
 /// Corners far off what the others scatter; how many.
 int drop_outliers(
     const Kept& kept, const BundleSummary& summary, int lens, double outlier, Counts& counts);

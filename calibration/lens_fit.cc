@@ -42,17 +42,17 @@ void begin(
     fit.views[of[i]].camera_from_board = initial_pose(fit.lens, planes[i]);
 }
 
-void take_over(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
+void take_over(LensFit& fit, const Kept& kept, const std::vector<double>& rms_px) {
   fit.lens = kept.bundle.lenses.front();
   for (std::size_t v = 0; v < kept.view.size(); ++v) {
     ViewFit& view = fit.views[kept.view[v]];
     view.camera_from_board = kept.bundle.camera_from_board[v];
-    view.rms_px = summary.view_rms_px[0][v];
+    view.rms_px = rms_px[v];
   }
 }
 
 void conclude(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
-  take_over(fit, kept, summary);
+  take_over(fit, kept, summary.view_rms_px.front());
   fit.deviation = summary.deviation.front();
   fit.rms_px = summary.rms_px.front();
   fit.worst_view_px = std::ranges::max(summary.view_rms_px.front());
@@ -80,7 +80,7 @@ Result<LensFit> fit_lens(int width,
     Kept kept = kept_of(fit.lens, board, views, fit.views, counts);
     const auto robust = adjust_robustly(kept.bundle, stop);
     if (!robust) return robust.error();
-    take_over(fit, kept, *robust);
+    take_over(fit, kept, typical_rms(kept, *robust, 0));
     if (leave_out(fit.views, options, "does not fit")) continue;
     fit.outliers = drop_outliers(kept, *robust, 0, options.outlier, counts);
     break;

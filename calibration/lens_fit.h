@@ -17,7 +17,9 @@ struct LensFitOptions {
   double blurred = 1.5;     ///< edges more than so many times as wide as most views', and 0.3 px
   double faint = 0.4;       ///< less than so much of most views' contrast
   double worst_view = 2.5;  ///< reprojection RMS over most views', and 0.05 px
-  double outlier = 4.5;     ///< a corner so many standard deviations off; 0: all count
+  double disagree =
+      1.6;  ///< reprojection RMS of both lenses together over that of each alone, and 0.01 px
+  double outlier = 4.5;  ///< a corner so many standard deviations off; 0: all count
   int fewest_views = 5;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -13,6 +14,7 @@ namespace opaline::calibration {
 namespace {
 
 constexpr int kPairRounds = 10;
+constexpr double kDisagreeFloor = 0.01;  // px
 
 Vec3 turn_of(const Pose& pose) {  // its axis times twice the sine of half its angle, roughly
   const auto& r = pose.rotation;
@@ -86,14 +88,34 @@ Kept kept_pair(const PairFit& fit,
   return kept;
 }
 
-void take_over_pair(PairFit& fit, const Kept& kept, const BundleSummary& summary) {
+void take_over_pair(PairFit& fit,
+                    const Kept& kept,
+                    const std::array<std::vector<double>, 2>& rms_px) {
   fit.joint_camera = kept.bundle.lenses[0];
   fit.joint_projector = kept.bundle.lenses[1];
   for (std::size_t v = 0; v < kept.view.size(); ++v) {
     ViewFit& view = fit.views[kept.view[v]];
     view.camera_from_board = kept.bundle.camera_from_board[v];
-    view.rms_px = std::hypot(summary.view_rms_px[0][v], summary.view_rms_px[1][v]) / std::sqrt(2.0);
+    view.rms_px = std::hypot(rms_px[0][v], rms_px[1][v]) / std::numbers::sqrt2;
   }
+}
+
+// Names the views that each lens alone can explain, and both together cannot; whether there are new ones.
+bool leave_out_moved(PairFit& fit, const LensFitOptions& options) {
+  bool any = false;
+  for (std::size_t v = 0; v < fit.views.size(); ++v) {
+    ViewFit& view = fit.views[v];
+    const double alone =
+        std::hypot(fit.camera.views[v].rms_px, fit.projector.views[v].rms_px) / std::numbers::sqrt2;
+    if (!view.kept() || view.rms_px <= options.disagree * alone + kDisagreeFloor) continue;
+    view.reason = fmt::format(
+        "camera and projector disagree by {:.2f} px, each alone fits to {:.2f}: it moved before "
+        "the patterns",
+        view.rms_px,
+        alone);
+    any = true;
+  }
+  return any;
 }
 
 Result<void> fit_together(PairFit& fit,
@@ -107,9 +129,8 @@ Result<void> fit_together(PairFit& fit,
     Kept kept = kept_pair(fit, board, views, counts);
     const auto robust = adjust_robustly(kept.bundle, stop);
     if (!robust) return robust.error();
-    take_over_pair(fit, kept, *robust);
-    if (leave_out(fit.views, options, "camera and projector disagree, as if it had moved"))
-      continue;
+    take_over_pair(fit, kept, {typical_rms(kept, *robust, 0), typical_rms(kept, *robust, 1)});
+    if (leave_out_moved(fit, options) || leave_out(fit.views, options, "does not fit")) continue;
     for (const int lens : {0, 1}) {
       drop_outliers(kept, *robust, lens, options.outlier, counts[static_cast<std::size_t>(lens)]);
     }
@@ -121,7 +142,7 @@ Result<void> fit_together(PairFit& fit,
                   std::max(kLeastSigma, fit.projector.rms_px)};
   const auto last = adjust(kept.bundle, how, stop);
   if (!last) return last.error();
-  take_over_pair(fit, kept, *last);
+  take_over_pair(fit, kept, {last->view_rms_px[0], last->view_rms_px[1]});
   fit.deviation = {last->deviation[0], last->deviation[1]};
   fit.place_deviation = last->pose_deviation;
   fit.stereo_rms_px = last->all_rms_px;

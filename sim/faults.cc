@@ -29,6 +29,7 @@ constexpr std::array kNames{
     FaultName{FaultKind::kFlicker, "flicker", "the lamp is 3 % off in this exposure"},
     FaultName{
         FaultKind::kWheelBeat, "wheel_beat", "the colour wheel turns a tenth faster than said"},
+    FaultName{FaultKind::kMovedBoard, "moved_board", "the calibration board is knocked against"},
     FaultName{FaultKind::kUnreportedExposure,
               "unreported_exposure",
               "1 s and more last a tenth longer, unsaid"},

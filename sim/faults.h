@@ -29,10 +29,11 @@ enum class FaultKind : std::uint8_t {
   kSlowProjector,  ///< the light follows a second late
   kLampStuck,      ///< dark() is acknowledged, the lamp stays on
   kGammaOn,  ///< the projector applies a gamma of 2.2 to the codes of the pattern it is told to show
-  kBlackDrift,          ///< the frame's codes are 24 too high
-  kSwappedChannels,     ///< the frame's red and blue are swapped
-  kFlicker,             ///< the lamp is 3 % off in this exposure, one way or the other
-  kWheelBeat,           ///< the colour wheel turns a tenth faster than it says during this exposure
+  kBlackDrift,       ///< the frame's codes are 24 too high
+  kSwappedChannels,  ///< the frame's red and blue are swapped
+  kFlicker,          ///< the lamp is 3 % off in this exposure, one way or the other
+  kWheelBeat,        ///< the colour wheel turns a tenth faster than it says during this exposure
+  kMovedBoard,  ///< a calibration board is knocked against before the projector shows the pattern
   kUnreportedExposure,  ///< an exposure of a second or more lasts a tenth longer than the frame says
 };
 

@@ -205,11 +205,14 @@ void Rig::darken() {
   const nanoseconds now = clock_.now();
   const Shown shown = timeline_.at(now);
   if (plan_.strikes(FaultKind::kLampStuck, shown ? shown->id : 0)) return;
+  if (shown) path_->darkened();
   timeline_.change(now, nullptr);
 }
 
 Shown Rig::render(const drivers::Pattern& pattern) {
-  const std::uint64_t content = content_hash(pattern.codes);
+  const std::uint64_t state = path_->state();
+  const std::uint64_t codes = content_hash(pattern.codes);
+  const std::uint64_t content = state == 0 ? codes : mix(codes, state);
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [key, light] : rendered_) {
@@ -247,6 +250,7 @@ Result<void> Rig::show(std::uint64_t session,
   }();
   const bool gamma = [&] {
     const std::lock_guard lock(mutex_);
+    if (plan_.strikes(FaultKind::kMovedBoard, pattern.id)) path_->knocked();
     return plan_.strikes(FaultKind::kGammaOn, pattern.id);
   }();
   Shown shown = render(gamma ? drivers::Pattern{pattern.id, with_gamma(pattern.codes), pattern.name}

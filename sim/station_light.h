@@ -28,6 +28,12 @@ class LightPath {
   virtual int patches_x() const = 0;  ///< of patch_irradiance
   virtual int patches_y() const = 0;
   virtual std::string scene() const = 0;  ///< what is looked at, as JSON
+  /// Which of its states the scene is in: what `light` says of a picture holds for one of them.
+  virtual std::uint64_t state() const { return 0; }
+  /// The lamp went dark: whoever attends the station may change the scene.
+  virtual void darkened() const {}
+  /// Somebody knocks against what is looked at.
+  virtual void knocked() const {}
 };
 
 /// Follows light from the projector through the sample to the camera's pixels: patch irradiances
