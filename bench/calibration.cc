@@ -1,7 +1,10 @@
 // What the station finds out about a simulated sensor, against what the sensor was made from. Prints one JSON object a
 // figure (bench/figure.h): response.rmse, a share of full scale over 5 to 95 % of the range, the worst of 8, 12 and 16
 // bits with gamma 2.2; hdr.bias, and hdr.variance_over_crb, the worst of 48 lights from 30 to 280000 electrons a second,
-// against the bound 1 / sum t^2 / var(light - black) over the exposures that do not clip.
+// against the bound 1 / sum t^2 / var(light - black) over the exposures that do not clip; capture.time_ratio_vs_fixed_bracket,
+// the time that exposures of 1/30 to 8 s take, each four times (sim_one_stop: twice) the one before, over that of planned ones
+// with the same goal, black frames included, the worse of marble and wax in the demo's station; and
+// capture.time_over_photon_limit, of the planned ones without black frames over what photon noise alone asks for.
 //
 //   calibration
 
@@ -12,6 +15,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "bench/calibrate/capture_time.h"
 #include "bench/figure.h"
 #include "calibration/response_fit.h"
 #include "capture/hdr_merge.h"
@@ -122,6 +126,41 @@ Merged merge_at(double rate) {
   return {std::abs(sum / n) / rate, variance * information(o, rate, seconds)};
 }
 
+bool print_capture_time() {
+  double least = 1e9;
+  double least_one_stop = 1e9;
+  double over_limit = 0.0;
+  for (const auto kind : {sim::SceneKind::kMarble, sim::SceneKind::kWax}) {
+    sim::SceneOptions scene;
+    scene.kind = kind;
+    const auto time = capture_time(scene);
+    if (!time) {
+      fmt::print(stderr, "calibration: {}: {}\n", sim::to_string(kind), time.error().message);
+      return false;
+    }
+    const double lights = time->planned - time->planned_black;
+    fmt::print(stderr,
+               "{}: fixed {:.1f} s, planned {:.1f} s ({:.1f} of them black), photon limit {:.1f} "
+               "s, {} lights out of "
+               "reach; at least {:.1f} % of cells reach SNR 100; variance said over found {:.3f}\n",
+               sim::to_string(kind),
+               time->fixed,
+               time->planned,
+               time->planned_black,
+               time->photon_limit,
+               time->out_of_reach,
+               100.0 * time->share_reached,
+               time->realised);
+    least = std::min(least, time->fixed / time->planned);
+    least_one_stop = std::min(least_one_stop, time->one_stop / time->planned);
+    over_limit = std::max(over_limit, lights / time->photon_limit);
+  }
+  print_figure("capture.time_ratio_vs_fixed_bracket", "sim", least, "1");
+  print_figure("capture.time_ratio_vs_fixed_bracket", "sim_one_stop", least_one_stop, "1");
+  print_figure("capture.time_over_photon_limit", "sim", over_limit, "1");
+  return true;
+}
+
 int run() {
   double worst = 0.0;
   for (const int bits : {8, 12, 16}) {
@@ -147,7 +186,7 @@ int run() {
   }
   print_figure("hdr.bias", "sim", most.bias, "1");
   print_figure("hdr.variance_over_crb", "sim", most.over_bound, "1");
-  return 0;
+  return print_capture_time() ? 0 : 1;
 }
 
 }  // namespace

@@ -1,19 +1,33 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 
 #include "base/block.h"
 #include "base/result.h"
 
 namespace opaline::capture {
 
-/// Which exposures a bracket is chosen from: whole turns of the projector's colour wheel.
+/// How the exposures of a light are chosen.
+enum class ExposureMode : std::uint8_t {
+  kBracket,  ///< from the middle: shorter while pixels saturate, longer while dark ones are noisy
+  kPlanned,  ///< by the camera's noise model, for the least time (ExposurePlanner)
+  kFixed,    ///< all of them
+};
+
+/// Which exposures a light is taken with: whole turns of the projector's colour wheel.
 struct ExposureOptions {
+  ExposureMode mode = ExposureMode::kBracket;
   std::chrono::nanoseconds shortest{33'333'333};    ///< > 0
   std::chrono::nanoseconds longest{8'000'000'000};  ///< >= shortest
   double ratio = 4.0;           ///< each exposure over the one before; > 1, at most 16
-  double wanted_snr = 50.0;     ///< of a dark pixel on the sample: exposures grow until met; > 0
+  double wanted_snr = 50.0;     ///< bracket: of a dark pixel on the sample; > 0
   double dark_quantile = 0.05;  ///< which pixel counts as dark; 0 to 0.5
+  double planned_snr = 100.0;   ///< of a surface cell, in each channel; > 0
+  double planned_share = 0.95;  ///< of the surface cells that must have it; 0 < s <= 1
+  /// Of a light's brightest cells (99.5 % quantile): what is darker than that needs only its noise, not its SNR; 0 to 1. No time buys SNR where
+  /// next to no light comes through.
+  double dim_share = 0.01;
 };
 
 /// Which lights the sample is measured under.

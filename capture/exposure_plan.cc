@@ -11,6 +11,8 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+constexpr nanoseconds kApart{100};
+
 double count(nanoseconds time) { return static_cast<double>(time.count()); }
 
 // `span` is the longest exposure over the shortest.
@@ -55,6 +57,22 @@ Result<std::vector<nanoseconds>> exposure_ladder(const ExposureOptions& options,
   }
   ladder.push_back(period * last);
   return ladder;
+}
+
+nanoseconds repeated_exposure(nanoseconds exposure, std::size_t repeat) {
+  return exposure + kApart * static_cast<std::int64_t>(repeat);
+}
+
+int planned_blacks(nanoseconds exposure, std::size_t ladder_size) {
+  constexpr nanoseconds kTogether = std::chrono::seconds(8);
+  const auto most =
+      static_cast<std::int64_t>(kMaxExposures / std::max<std::size_t>(ladder_size, 1));
+  return static_cast<int>(
+      std::clamp<std::int64_t>(kTogether / exposure, 1, std::clamp<std::int64_t>(most, 1, 8)));
+}
+
+bool same_exposure(nanoseconds a, nanoseconds b) {
+  return std::chrono::abs(a - b) < kApart * static_cast<std::int64_t>(kMaxExposures);
 }
 
 Bracket::Bracket(const ExposureOptions& options, std::size_t ladder_size)

@@ -28,6 +28,15 @@ struct ExposureLimits {
 Result<std::vector<std::chrono::nanoseconds>> exposure_ladder(const ExposureOptions& options,
                                                               const ExposureLimits& limits);
 
+/// Frames of one exposure, counted from 0, are each exposed for 100 ns longer than the one before, so that none can pass
+/// for another.
+std::chrono::nanoseconds repeated_exposure(std::chrono::nanoseconds exposure, std::size_t repeat);
+/// How many black frames of an exposure planned lights are taken with: as many as eight seconds hold, 1 to 8, and no
+/// more than kMaxExposures with the rest of the ladder. All lights share them, so they are worth more than a light's own frames.
+int planned_blacks(std::chrono::nanoseconds exposure, std::size_t ladder_size);
+/// Whether one is a repetition of the other.
+bool same_exposure(std::chrono::nanoseconds a, std::chrono::nanoseconds b);
+
 /// What one frame says about its exposure, over the camera pixels that see the sample.
 struct ExposureStatistics {
   double saturated_share = 0.0;  ///< of pixels

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -22,9 +23,11 @@ using std::chrono::nanoseconds;
 constexpr int kFormat = 1;
 constexpr std::size_t kFrameLimit = std::size_t{1} << 30;
 
-std::string file_name(const CapturedFrame& captured) {
+// `repeat` counts the frames of the same exposure before it.
+std::string file_name(const CapturedFrame& captured, std::ptrdiff_t repeat) {
   const double ms = std::chrono::duration<double, std::milli>(captured.exposure_asked).count();
-  return fmt::format("{:02}-{:.0f}ms.png", captured.exposure_index, ms);
+  const std::string again = repeat > 0 ? fmt::format("-{}", repeat + 1) : std::string();
+  return fmt::format("{:02}-{:.0f}ms{}.png", captured.exposure_index, ms, again);
 }
 
 json identity_of(const drivers::Pattern& pattern) {
@@ -119,10 +122,14 @@ Result<void> FrameStore::save(const std::string& light,
   const fs::path directory = directory_ / light;
   if (auto made = files_.make_directories(directory); !made) return made;
   json entries = json::array();
-  for (const CapturedFrame& captured : frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const CapturedFrame& captured = frames[i];
     const auto bytes = encode_image({captured.frame.pixels, {}, {}}, ImageFormat::kPng);
     if (!bytes) return bytes.error().in(light);
-    const std::string name = file_name(captured);
+    const std::string name =
+        file_name(captured,
+                  std::ranges::count(
+                      frames.first(i), captured.exposure_index, &CapturedFrame::exposure_index));
     if (auto written = files_.write(directory / name, *bytes); !written) return written;
     if (auto synced = files_.sync(directory / name); !synced) return synced;
     entries.push_back(describe(captured, name, sha256_hex(*bytes)));

@@ -30,7 +30,7 @@ struct StoredLight {
 
 /// The raw frames of a session on disk:
 ///
-///   LIGHT/INDEX-MILLISECONDSms.png   16-bit, the camera's codes
+///   LIGHT/INDEX-MILLISECONDSms.png   16-bit, the camera's codes; -2, -3, ... for frames of the same exposure
 ///   LIGHT/index.json                 written last: format version, identity of the pattern; per
 ///                                    frame pattern, trigger count, times, exposure, and the
 ///                                    SHA-256 of pixels and file

@@ -86,8 +86,26 @@ double HdrMerge::weight_in(const Image<std::uint16_t>& frame, int x, int y, int 
 double HdrMerge::variance_of(const Term& t, double rate, double leak_rate) const {
   const double scale = t.seconds / t.black_seconds;
   const double mean = (std::max(rate, 0.0) + std::max(leak_rate, 0.0)) * t.seconds;
-  return noise_variance(camera_, mean, t.per_code) +
-         scale * scale * noise_variance(camera_, leak_rate * t.black_seconds, t.black_per_code);
+  return noise_variance(camera_, mean, t.per_code) / t.frames +
+         scale * scale * noise_variance(camera_, leak_rate * t.black_seconds, t.black_per_code) /
+             t.blacks;
+}
+
+Electrons HdrMerge::black_of(const ExposurePair& pair, int x, int y, int channel) const {
+  Electrons mean = electrons_[pair.black->at(x, y, channel)];
+  if (pair.more_black.empty()) return mean;
+  for (const Image<std::uint16_t>* const more : pair.more_black)
+    mean.signal += electrons_[more->at(x, y, channel)].signal;
+  mean.signal /= 1.0 + static_cast<double>(pair.more_black.size());
+  return mean;
+}
+
+void HdrMerge::Term::add(double other_weight, double other_seconds, double other_net) {
+  const double more = frames + 1.0;
+  weight += (other_weight - weight) / more;
+  seconds += (other_seconds - seconds) / more;
+  net += (other_net - net) / more;
+  frames = more;
 }
 
 HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
@@ -109,18 +127,32 @@ HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
     const double weight = shortest ? 1.0 : weight_in(*pair.light, x, y, channel);
     if (weight == 0.0) continue;
     const Electrons& light = electrons_[code];
-    const Electrons& black = electrons_[pair.black->at(x, y, channel)];
+    const Electrons black = black_of(pair, x, y, channel);
+    const double blacks = 1.0 + static_cast<double>(pair.more_black.size());
     const double scale = pair.light_seconds / pair.black_seconds;
     const double net = light.signal - black.signal * scale;
-    electrons += weight * net;
-    seconds += weight * pair.light_seconds;
-    leak += black.signal;
-    black_seconds += pair.black_seconds;
-    all[count++] = {
-        weight, pair.light_seconds, pair.black_seconds, net, light.per_code, black.per_code};
+    if (!shortest && all[count - 1].black == pair.black) {
+      all[count - 1].add(weight, pair.light_seconds, net);
+      continue;
+    }
+    leak += blacks * black.signal;
+    black_seconds += blacks * pair.black_seconds;
+    all[count++] = {weight,
+                    pair.light_seconds,
+                    pair.black_seconds,
+                    net,
+                    light.per_code,
+                    black.per_code,
+                    1.0,
+                    blacks,
+                    pair.black};
   }
   const double leak_rate = leak / black_seconds;
   const auto terms = std::span(all).first(count);
+  for (const Term& t : terms) {
+    electrons += t.weight * t.frames * t.net;
+    seconds += t.weight * t.frames * t.seconds;
+  }
   const double first_estimate = electrons / seconds;
   double sum = 0.0;
   double total = 0.0;

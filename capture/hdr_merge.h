@@ -17,6 +17,8 @@ struct ExposurePair {
   const Image<std::uint16_t>* black = nullptr;  ///< outlives the pair
   double light_seconds = 0.0;                   ///< as measured
   double black_seconds = 0.0;
+  /// Further black frames of that exposure, which are averaged with it; they outlive the pair.
+  std::span<const Image<std::uint16_t>* const> more_black = {};
 };
 
 /// Radiance as the camera saw it, 3 channels, camera pixels.
@@ -35,7 +37,7 @@ struct HdrImage {
 /// where the first estimate is the same sum with w_i = 1, which needs no noise parameter and has no bias (Hanji, Zhong,
 /// Mantiuk 2020, Eq. 9). v_i is the camera's noise model: shot noise of light and leak, read noise and quantisation, of both
 /// frames of the pair, the leak being that of all black frames together, so that no weight follows the noise of its own
-/// black. The variance returned is 1 / sum_i t_i^2 / v_i at the result: the Cramer-Rao bound of the exposures used.
+/// black. Several frames less the same black frame are averaged first: one term, of the light's noise over their number. The variance returned is 1 / sum_i t_i^2 / v_i at the result: the Cramer-Rao bound of the exposures used.
 ///
 /// Whether an exposure is used must not depend on the noise of what it would add, or low codes are selected. So a sample
 /// near clipping is judged by the mean of its eight neighbours in the same frame: used where that mean and three
@@ -54,8 +56,12 @@ class HdrMerge {
     double variance = 0.0;
     bool saturated = false;
   };
-  struct Term {
+  struct Term {  // frames of one exposure, less the black frame that they share: their means
     double weight, seconds, black_seconds, net, per_code, black_per_code;
+    double frames = 1.0;
+    double blacks = 1.0;
+    const Image<std::uint16_t>* black = nullptr;
+    void add(double other_weight, double other_seconds, double other_net);
   };
   Sample merge_sample(std::span<const ExposurePair> sorted, int x, int y, int channel) const;
   double weight_in(const Image<std::uint16_t>& frame, int x, int y, int channel) const;
@@ -63,6 +69,7 @@ class HdrMerge {
                                     int x,
                                     int y,
                                     int channel) const;
+  Electrons black_of(const ExposurePair& pair, int x, int y, int channel) const;
   double variance_of(const Term& term, double rate, double leak_rate) const;
   CameraCalibration camera_;
   Image<std::uint8_t> hot_;

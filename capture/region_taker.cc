@@ -18,6 +18,19 @@ constexpr nanoseconds kReplugPause = std::chrono::milliseconds(200);
 
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
+constexpr double kDominates = 5.0;
+
+// Whether shot noise of what leaks is well above the noise of reading a frame.
+bool leak_dominates(const CameraCalibration& camera, const Image<std::uint16_t>& black) {
+  std::vector<std::uint16_t> codes(black.samples().begin(), black.samples().end());
+  const auto upper =
+      codes.begin() + std::ssize(codes) * 3 / 4;  // beside the sample it may be darker
+  std::ranges::nth_element(codes, upper);
+  const Electrons leak = electrons_from_code(camera, *upper);
+  const double read = camera.read_noise_electrons;
+  return leak.signal > kDominates * (read * read + leak.per_code * leak.per_code / 12.0);
+}
+
 bool can_retry(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kTimeout || code == ErrorCode::kBusy;
 }
@@ -31,6 +44,13 @@ BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
   std::vector<const Image<std::uint16_t>*> pictures;
   for (const CapturedFrame& captured : frames_) pictures.push_back(&captured.frame.pixels);
   hot_ = find_hot_pixels(camera, pictures);
+  others_.resize(frames_.size());
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    for (const CapturedFrame& other : frames_) {
+      if (&other != &frames_[i] && same_exposure(other.exposure_asked, frames_[i].exposure_asked))
+        others_[i].push_back(&other.frame.pixels);
+    }
+  }
   std::ranges::transform(seen.samples(),
                          hot_.samples(),
                          footprint_.samples().begin(),
@@ -41,18 +61,34 @@ BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
 
 bool BlackFrames::cover(std::span<const nanoseconds> exposures) const {
   return std::ranges::all_of(exposures, [this](nanoseconds exposure) {
-    return std::ranges::find(frames_, exposure, &CapturedFrame::exposure_asked) != frames_.end();
+    return std::ranges::any_of(frames_, [exposure](const CapturedFrame& black) {
+      return same_exposure(black.exposure_asked, exposure);
+    });
   });
 }
 
+std::size_t BlackFrames::useful(std::span<const nanoseconds> exposures,
+                                const CameraCalibration& camera) const {
+  for (std::size_t i = 0; i < exposures.size(); ++i) {
+    for (const CapturedFrame& black : frames_) {
+      if (same_exposure(black.exposure_asked, exposures[i]) &&
+          leak_dominates(camera, black.frame.pixels))
+        return i + 1;
+    }
+  }
+  return exposures.size();
+}
+
 std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const {
-  const auto black =
-      std::ranges::find(frames_, light.exposure_asked, &CapturedFrame::exposure_asked);
+  const auto black = std::ranges::find_if(frames_, [&](const CapturedFrame& frame) {
+    return same_exposure(frame.exposure_asked, light.exposure_asked);
+  });
   if (black == frames_.end()) return std::nullopt;
   return ExposurePair{&light.frame.pixels,
                       &black->frame.pixels,
                       seconds(light.frame.exposure),
-                      seconds(black->frame.exposure)};
+                      seconds(black->frame.exposure),
+                      others_[static_cast<std::size_t>(black - frames_.begin())]};
 }
 
 std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
@@ -95,6 +131,7 @@ Result<std::unique_ptr<RegionTaker>> RegionTaker::create(const Station& station,
                                  taker->camera_.longest_exposure});
   if (!ladder) return ladder.error();
   taker->ladder_ = *std::move(ladder);
+  for (const nanoseconds exposure : taker->ladder_) taker->whole_ladder_ += exposure;
   return taker;
 }
 
@@ -192,9 +229,10 @@ std::optional<RegionTaker::Failure> RegionTaker::show(const drivers::Pattern& pa
 
 RegionTaker::CaptureResult RegionTaker::capture(const drivers::Pattern& pattern,
                                                 std::size_t index,
+                                                std::size_t repeat,
                                                 const Watcher& watcher,
                                                 std::stop_token stop) {
-  const nanoseconds exposure = ladder_[index];
+  const nanoseconds exposure = repeated_exposure(ladder_[index], repeat);
   if (watcher) watcher(exposure);
   const std::string where = fmt::format("exposure of {:.4g} s", seconds(exposure));
   auto frame = station_.camera.capture({exposure, pattern.id, pattern.name}, stop);
@@ -216,10 +254,17 @@ RegionTaker::Attempt RegionTaker::attempt_black(const drivers::Pattern& black,
                                                 std::stop_token stop) {
   if (auto failure = show(black, stop)) return tl::unexpected(*std::move(failure));
   TakenLight taken{{}, true, 0};
+  const bool planned = settings_.options.exposures.mode == ExposureMode::kPlanned;
   for (std::size_t i = 0; i < ladder_.size(); ++i) {
-    auto frame = capture(black, i, watcher, stop);
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    taken.frames.push_back(*std::move(frame));
+    const int times = planned ? planned_blacks(ladder_[i], ladder_.size()) : 1;
+    for (int repeat = 0; repeat < times; ++repeat) {
+      auto frame = capture(black, i, static_cast<std::size_t>(repeat), watcher, stop);
+      if (!frame) return tl::unexpected(std::move(frame.error()));
+      taken.frames.push_back(*std::move(frame));
+    }
+    if (planned && leak_dominates(settings_.camera, taken.frames.back().frame.pixels)) {
+      ladder_.resize(i + 1);
+    }
   }
   return taken;
 }
@@ -227,25 +272,32 @@ RegionTaker::Attempt RegionTaker::attempt_black(const drivers::Pattern& black,
 RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
                                                 const BlackFrames& black,
                                                 const Watcher& watcher,
-                                                std::stop_token stop) {
+                                                std::stop_token stop,
+                                                const ChooseExposures& choose) {
   if (auto failure = show(pattern, stop)) return tl::unexpected(*std::move(failure));
   TakenLight taken;
+  taken.frames.reserve(kMaxExposures);  // pairs point into it
   std::vector<FrameLight> lights;
   std::vector<double> times;
-  Bracket bracket(settings_.options.exposures, ladder_.size());
-  while (const auto index = bracket.next()) {
-    auto frame = capture(pattern, *index, watcher, stop);
+  const std::unique_ptr<ExposureChooser> chooser =
+      choose ? choose()
+             : std::make_unique<BracketChooser>(settings_.options.exposures, ladder_.size());
+  while (taken.frames.size() < kMaxExposures) {
+    const auto index = chooser->next();
+    if (!index) break;
+    const auto repeat = std::ranges::count(taken.frames, *index, &CapturedFrame::exposure_index);
+    auto frame = capture(pattern, *index, static_cast<std::size_t>(repeat), watcher, stop);
     if (!frame) return tl::unexpected(std::move(frame.error()));
-    const auto pair = black.pair(*frame);
+    taken.frames.push_back(*std::move(frame));
+    const auto pair = black.pair(taken.frames.back());
     if (!pair) {
       return tl::unexpected(Failure{internal_error("no black frame for this exposure"), "black"});
     }
     lights.push_back(measure_light(
         settings_.camera, *pair, black.footprint(), settings_.options.exposures.dark_quantile));
     times.push_back(pair->light_seconds);
-    bracket.add(*index, lights.back().statistics);
+    chooser->add(*index, *pair, lights.back());
     taken.lit = taken.lit || lights.back().lit();
-    taken.frames.push_back(*std::move(frame));
   }
   if (const auto dark = find_black_frame(lights, times)) {
     const double asked = seconds(taken.frames[*dark].exposure_asked);
@@ -254,7 +306,7 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
                     "exposure of {:.4g} s: black frame: other exposures show light", asked)),
                 std::string(to_string(FrameFault::kBlack))});
   }
-  std::ranges::sort(taken.frames, {}, &CapturedFrame::exposure_index);
+  std::ranges::stable_sort(taken.frames, {}, &CapturedFrame::exposure_index);
   return taken;
 }
 
@@ -265,13 +317,20 @@ Result<TakenLight> RegionTaker::take_black(const drivers::Pattern& black,
       "black", [&] { return attempt_black(black, watcher, stop); }, stop);
 }
 
+void RegionTaker::use_black(const BlackFrames& black) {
+  if (settings_.options.exposures.mode != ExposureMode::kPlanned) return;
+  const std::size_t useful = black.useful(ladder_, settings_.camera);
+  if (black.cover(std::span(ladder_).first(useful))) ladder_.resize(useful);
+}
+
 Result<TakenLight> RegionTaker::take_light(const std::string& name,
                                            const drivers::Pattern& pattern,
                                            const BlackFrames& black,
                                            const Watcher& watcher,
-                                           std::stop_token stop) {
+                                           std::stop_token stop,
+                                           const ChooseExposures& choose) {
   return with_retries(
-      name, [&] { return attempt_light(pattern, black, watcher, stop); }, stop);
+      name, [&] { return attempt_light(pattern, black, watcher, stop, choose); }, stop);
 }
 
 }  // namespace opaline::capture

@@ -15,6 +15,7 @@
 #include "base/result.h"
 #include "capture/calibration.h"
 #include "capture/capture_options.h"
+#include "capture/exposure_chooser.h"
 #include "capture/exposure_plan.h"
 #include "capture/frame_check.h"
 #include "capture/frame_store.h"
@@ -27,6 +28,9 @@ namespace opaline::capture {
 class BlackFrames {
  public:
   BlackFrames() = default;
+  BlackFrames(BlackFrames&&) = default;
+  BlackFrames& operator=(BlackFrames&&) = default;
+  ~BlackFrames() = default;
   /// `seen` marks the pixels (1) that see the sample.
   BlackFrames(std::vector<CapturedFrame> frames,
               const CameraCalibration& camera,
@@ -34,16 +38,21 @@ class BlackFrames {
   bool empty() const { return frames_.empty(); }
   /// Whether there is a black of each of these exposures.
   bool cover(std::span<const std::chrono::nanoseconds> exposures) const;
+  /// Of these exposures, how many it takes until what leaks is well above the read noise; all where it never is.
+  std::size_t useful(std::span<const std::chrono::nanoseconds> exposures,
+                     const CameraCalibration& camera) const;
   /// Hot pixels: 1.
   const Image<std::uint8_t>& hot() const { return hot_; }
   /// Pixels that see the sample and are not hot: 1. Only these tell light from dark, since a hot
   /// one saturates in a long exposure without any light.
   const Image<std::uint8_t>& footprint() const { return footprint_; }
-  /// The pair of a frame with the black of its exposure; none when there is no such black.
+  /// The pair of a frame with the blacks of its exposure; none when there is no such black. We outlive the pair.
   std::optional<ExposurePair> pair(const CapturedFrame& light) const;
 
  private:
+  using Pictures = std::vector<const Image<std::uint16_t>*>;
   std::vector<CapturedFrame> frames_;
+  std::vector<Pictures> others_;  ///< of each frame: those of the same exposure
   Image<std::uint8_t> hot_;
   Image<std::uint8_t> footprint_;
 };
@@ -81,17 +90,24 @@ class RegionTaker {
   /// Called before each exposure, for those who watch.
   using Watcher = std::function<void(std::chrono::nanoseconds exposure)>;
 
-  /// The black pattern at every exposure of the ladder.
+  /// The black pattern at every exposure of the ladder; for planned exposures planned_blacks() times, and none
+  /// longer than one in which the noise of what leaks is five times that of reading: several of these are as good.
   Result<TakenLight> take_black(const drivers::Pattern& black,
                                 const Watcher& watcher,
                                 std::stop_token stop);
-  /// A bracket of one light. Not lit when even the longest exposure shows nothing, each time.
+  /// The exposures of one light that `choose` wants; none: a bracket. Not lit when even the longest exposure shows nothing,
+  /// each time.
   Result<TakenLight> take_light(const std::string& name,
                                 const drivers::Pattern& pattern,
                                 const BlackFrames& black,
                                 const Watcher& watcher,
-                                std::stop_token stop);
+                                std::stop_token stop,
+                                const ChooseExposures& choose = nullptr);
   std::span<const std::chrono::nanoseconds> ladder() const { return ladder_; }
+  /// What one frame at each exposure of the options takes.
+  std::chrono::nanoseconds whole_ladder() const { return whole_ladder_; }
+  /// Goes on with the exposures that black frames taken before are of, where take_black() would take no others.
+  void use_black(const BlackFrames& black);
   /// Bytes of one raw frame.
   std::size_t frame_bytes() const;
 
@@ -114,6 +130,7 @@ class RegionTaker {
   std::optional<Failure> show(const drivers::Pattern& pattern, std::stop_token stop);
   CaptureResult capture(const drivers::Pattern& pattern,
                         std::size_t index,
+                        std::size_t repeat,
                         const Watcher& watcher,
                         std::stop_token stop);
   Attempt attempt_black(const drivers::Pattern& black,
@@ -122,7 +139,8 @@ class RegionTaker {
   Attempt attempt_light(const drivers::Pattern& pattern,
                         const BlackFrames& black,
                         const Watcher& watcher,
-                        std::stop_token stop);
+                        std::stop_token stop,
+                        const ChooseExposures& choose);
 
   Station station_;
   Settings settings_;
@@ -131,6 +149,7 @@ class RegionTaker {
   drivers::CameraInfo camera_;
   std::optional<FrameCheck> check_;
   std::vector<std::chrono::nanoseconds> ladder_;
+  std::chrono::nanoseconds whole_ladder_{};
 };
 
 /// A frame without light though another of the same bracket proves that there is some: its index.

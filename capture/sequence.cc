@@ -8,9 +8,11 @@
 #include <system_error>
 #include <utility>
 
+#include "base/direct_light.h"
 #include "base/io/dataset_io.h"
 #include "base/log.h"
 #include "capture/dataset_builder.h"
+#include "capture/exposure_planner.h"
 #include "capture/frame_store.h"
 #include "capture/hdr_file.h"
 #include "capture/hdr_merge.h"
@@ -25,6 +27,7 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 constexpr const char* kBlackName = "black";
+constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on average at most
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
 
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
@@ -37,6 +40,12 @@ Result<std::uint64_t> free_on_disk(const fs::path& directory) {
         fmt::format("cannot tell the free space of {}: {}", directory.string(), error.message()));
   }
   return static_cast<std::uint64_t>(space.available);
+}
+
+double exposed_seconds(std::span<const CapturedFrame> frames) {
+  double sum = 0.0;
+  for (const CapturedFrame& frame : frames) sum += seconds(frame.exposure_asked);
+  return sum;
 }
 
 bool any_set(const Image<std::uint8_t>& mask) {
@@ -78,6 +87,8 @@ class Sequence {
   Result<std::vector<CapturedFrame>> load(const std::string& name, const drivers::Pattern& pattern);
   Result<Frames> frames_of(const Light& light, std::stop_token stop);
   Result<Frames> take(const Light& light, std::stop_token stop);
+  Image<std::uint8_t> ignored_in(const Light& light) const;
+  std::unique_ptr<ExposureChooser> chooser_of(const Light& light) const;
   Result<void> confirm_lamp(const std::string& region, std::stop_token stop);
   Result<std::vector<ExposurePair>> pairs_of(const std::string& name,
                                              std::span<const CapturedFrame> frames) const;
@@ -97,6 +108,7 @@ class Sequence {
   nanoseconds started_;
   CaptureSummary summary_;
   BlackFrames black_;
+  std::optional<PlannedCells> cells_;
   std::unique_ptr<RegionTaker> taker_;
   std::optional<HdrMerge> merge_;
   int unusable_regions_ = 0;
@@ -144,6 +156,7 @@ Result<void> Sequence::note_plan() {
 void Sequence::use_black(std::vector<CapturedFrame> frames) {
   black_ = BlackFrames(std::move(frames), task_.calibration.camera, map_.footprint());
   merge_.emplace(task_.calibration.camera, black_.hot());
+  cells_.emplace(map_, black_.footprint(), task_.options.min_coverage);
 }
 
 // The devices are opened only when something is left to take. Where they, or the options, expose
@@ -154,6 +167,7 @@ Result<RegionTaker*> Sequence::taker(std::stop_token stop) {
       RegionTaker::create(station_, {task_.options, task_.calibration.camera}, work_.events);
   if (!made) return made.error();
   taker_ = *std::move(made);
+  taker_->use_black(black_);
   if (auto space = check_space(); !space) return space.error();
   if (!black_.cover(taker_->ladder())) {
     if (auto black = take_black(stop); !black) return black.error();
@@ -163,7 +177,9 @@ Result<RegionTaker*> Sequence::taker(std::stop_token stop) {
 
 // Frames and pictures are counted at their size before compression.
 Result<void> Sequence::check_space() const {
-  const std::uint64_t frames = taker_->ladder().size() * taker_->frame_bytes();
+  const bool repeats = task_.options.exposures.mode == ExposureMode::kPlanned;
+  const std::uint64_t frames =
+      taker_->ladder().size() * taker_->frame_bytes() * (repeats ? kRepeats : 1);
   const std::uint64_t picture = taker_->frame_bytes() / 6 * 8 * sizeof(float);
   const auto missing = static_cast<std::uint64_t>(std::ranges::count_if(
       patterns_.lights, [&](const Light& light) { return !store_.has(light.name); }));
@@ -249,6 +265,36 @@ Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token
   return found;
 }
 
+// Cells that are lit directly where the lit face is seen: 1.
+Image<std::uint8_t> Sequence::ignored_in(const Light& light) const {
+  if (task_.sample.lit_face != task_.sample.seen_face) return {};
+  const Block& block = task_.sample.block;
+  const Face face = task_.sample.seen_face;
+  Image<std::uint8_t> kept(block.face_width(face), block.face_height(face), 1, 1);
+  mask_direct_light(block, face, light.irradiance, task_.options.direct_light_margin_mm, kept);
+  for (std::uint8_t& k : kept.samples()) k = k == 0 ? 1 : 0;
+  return kept;
+}
+
+std::unique_ptr<ExposureChooser> Sequence::chooser_of(const Light& light) const {
+  const ExposureOptions& options = task_.options.exposures;
+  const auto ladder = taker_->ladder();
+  switch (options.mode) {
+    case ExposureMode::kFixed:
+      return std::make_unique<WholeLadder>(ladder.size());
+    case ExposureMode::kPlanned:
+      return std::make_unique<ExposurePlanner>(options,
+                                               task_.calibration.camera,
+                                               ladder,
+                                               seconds(taker_->whole_ladder()),
+                                               *cells_,
+                                               ignored_in(light));
+    case ExposureMode::kBracket:
+      break;
+  }
+  return std::make_unique<BracketChooser>(options, ladder.size());
+}
+
 Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop) {
   auto devices = taker(stop);
   if (!devices) return devices.error();
@@ -257,7 +303,8 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
       light.pattern,
       black_,
       [&](nanoseconds exposure) { report(light.name, exposure); },
-      stop);
+      stop,
+      [&] { return chooser_of(light); });
   if (!taken) return taken.error();
   summary_.retaken += taken->retaken;
   if (!taken->lit) {
@@ -270,6 +317,7 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
                                        {{"region", light.name},
                                         {"held_out", light.held_out},
                                         {"exposures", taken->frames.size()},
+                                        {"exposed_s", exposed_seconds(taken->frames)},
                                         {"retaken", taken->retaken}});
   if (!noted) return noted.error();
   return Frames{std::move(taken->frames), taken->lit};

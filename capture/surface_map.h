@@ -37,12 +37,18 @@ class SurfaceMap {
   const Image<std::uint8_t>& footprint() const { return footprint_; }
   const FaceView& view() const { return view_; }
 
- private:
+  /// What a cell has of a camera pixel.
   struct Share {
     int x;
     int y;
-    float area;  // of the pixel, in pixels
+    float area;  ///< of the pixel, in pixels
   };
+  std::size_t cell_count() const { return cells_.size(); }
+  /// Of the cell at this place of the face's raster, row by row.
+  const std::vector<Share>& shares_of(std::size_t place) const { return cells_[place].shares; }
+  double cell_area(std::size_t place) const { return cells_[place].area; }  ///< pixels
+
+ private:
   struct Cell {
     std::vector<Share> shares;
     double area = 0.0;  // of the whole quadrilateral, in pixels

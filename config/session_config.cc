@@ -23,6 +23,7 @@ constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 2> kCameraNames{"refracted_ray", "surface"};
 constexpr std::array<std::string_view, 2> kKindNames{"block", "led_sphere"};
+constexpr std::array<std::string_view, 3> kExposureNames{"bracket", "planned", "fixed"};
 constexpr std::array<std::string_view, 2> kPatternNames{"shifted", "split"};
 constexpr std::array<std::string_view, 3> kQualityNames{"draft", "standard", "reference"};
 constexpr std::array<std::string_view, 2> kStructureNames{"separate", "shared"};
@@ -43,17 +44,28 @@ void visit_sample(Fields& fields, SessionConfig& session) {
 }
 
 void visit_exposures(Fields& fields, capture::ExposureOptions& e) {
+  fields.one_of({"mode", "planned: least time by the camera's noise; fixed: all exposures"},
+                e.mode,
+                kExposureNames);
   fields.duration({"shortest", "is rounded to whole turns of the colour wheel"}, e.shortest);
   fields.duration({"longest", ""}, e.longest);
   fields.check(e.longest >= e.shortest, "longest", "expected at least shortest");
   fields.number({"ratio", "each exposure over the one before"},
                 e.ratio,
                 Range{.min = 1.0, .max = 16.0, .min_excluded = true});
-  fields.number({"wanted_snr", "of a dark pixel on the sample; longer exposures until it is met"},
+  fields.number({"wanted_snr", "bracket: of a dark pixel on the sample; longer until it is met"},
                 e.wanted_snr,
                 Range::above(0));
   fields.number(
       {"dark_quantile", "which pixel counts as dark"}, e.dark_quantile, Range::between(0, 0.5));
+  fields.number(
+      {"planned_snr", "planned: of surface cells, each channel"}, e.planned_snr, Range::above(0));
+  fields.number({"planned_share", "planned: of the cells that must have it"},
+                e.planned_share,
+                Range{.min = 0.0, .max = 1.0, .min_excluded = true});
+  fields.number({"dim_share", "planned: of the brightest cells; darker ones need only its noise"},
+                e.dim_share,
+                Range::between(0, 1));
 }
 
 void visit_capture(Fields& fields, SessionConfig& session, const Agreement* agreement) {
@@ -238,6 +250,10 @@ void visit_session(Fields& fields, SessionConfig& session, Agreement* agreement 
   });
   fields.table({"capture", "How it is captured."},
                [&](Fields& f) { visit_capture(f, session, agreement); });
+  fields.check(!in_sphere || session.capture.exposures.mode == capture::ExposureMode::kBracket,
+               "kind",
+               "exposures are planned for surface cells, which a sphere of lights has none of; "
+               "expected capture.exposures.mode = \"bracket\"");
   fields.table({"reconstruction", "How the material is found."},
                [&](Fields& f) { visit_reconstruction(f, session); });
   fields.table({"preview", "How the report's pictures are made."},

@@ -108,6 +108,36 @@ TEST_F(SequenceTest, CapturesEveryRegionAndHeldOutLightIntoADataset) {
   EXPECT_TRUE(fs::exists(dir_.path() / "hdr" / "region_1_1.exr"));
 }
 
+TEST_F(SequenceTest, PlansExposuresThatTakeLessTimeThanAllOfThem) {
+  const auto exposed_in = [&](ExposureMode mode, const std::string& name) {
+    task_.options.exposures.mode = mode;
+    const auto summary = run(dir_.path() / name);
+    EXPECT_TRUE(summary) << summary.error().message;
+    double sum = 0.0;
+    for (const auto& fact : events_->facts("region.captured"))
+      sum += fact["exposed_s"].get<double>();
+    return sum;
+  };
+  const double planned = exposed_in(ExposureMode::kPlanned, "planned");
+  const double fixed = exposed_in(ExposureMode::kFixed, "fixed");
+  EXPECT_NEAR(fixed, 11 * 325.0 / 30.0, 1e-3);  // 1, 4, 16, 64 and 240 turns
+  EXPECT_LT(planned, 0.5 * fixed);
+  const auto set = read_dataset(dir_.path() / "planned");
+  ASSERT_TRUE(set) << set.error().message;
+  EXPECT_EQ(set->illuminations.size(), 11u);
+}
+
+TEST_F(SequenceTest, GoesOnWithPlannedExposuresWhereItWasStopped) {
+  task_.options.exposures.mode = ExposureMode::kPlanned;
+  ASSERT_TRUE(run(dir_.path() / "whole"));
+  ASSERT_TRUE(run(dir_.path() / "stopped"));
+  fs::remove_all(dir_.path() / "stopped" / "frames" / "region_1_0");
+  const auto summary = run(dir_.path() / "stopped");
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 1);
+  EXPECT_EQ(results_of(dir_.path() / "stopped"), results_of(dir_.path() / "whole"));
+}
+
 // Regions of 4 x 4 mm on 8 x 8 mm: what is lit or within 1.5 mm of it is left out, by the distance of a cell's middle
 // to the rectangle.
 TEST_F(SequenceTest, LeavesOutWhatIsLitDirectlyWhereTheLitFaceIsSeen) {
