@@ -296,6 +296,11 @@ void declare_render(CLI::App& app, Arguments& arguments, int& status_code) {
                   "This many pictures of the objects' full turn, numbered NAME_000 and on")
       ->check(CLI::Range(0, 100000));
   sub->add_option("--stats", wish.stats, "File for the statistics as JSON, in place of text");
+  sub->add_option(
+         "--draw", wish.draw, "host: rays on the processor; vulkan: rasteriser and shadow maps")
+      ->check(CLI::IsMember({"host", "vulkan"}))
+      ->capture_default_str();
+  sub->add_option("--device", wish.device, "Part of the name of the Vulkan device that draws");
   sub->add_option("--save-material",
                   wish.materials,
                   "OBJECT=FILE.vdb: the object's material with its edits; may be given again");

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "gpu/commands.h"
+#include "render/raster/resolve_pass.h"
 #include "render/scene_buffer.h"
 #include "render_shaders.h"
 
@@ -19,9 +20,6 @@ constexpr int kTileSamples =
 struct TilePush {
   std::array<std::int32_t, 2> origin;
   std::array<std::int32_t, 2> size;
-};
-struct ResolvePush {
-  std::uint32_t width, height, samples_per_axis;
 };
 
 /// What one tile is drawn and averaged in.
@@ -94,17 +92,15 @@ Result<void> Renderer::State::draw_tile(
     const gpu::Buffer& scene, const gpu::Buffer& field, int faces, int x0, int y0) {
   const int s = options.samples_per_axis;
   const TilePush where{{x0 * s, y0 * s}, {tile->width * s, tile->height * s}};
-  const ResolvePush shape{static_cast<std::uint32_t>(tile->width),
-                          static_cast<std::uint32_t>(tile->height),
-                          static_cast<std::uint32_t>(s)};
+  const ResolveShape shape{static_cast<std::uint32_t>(tile->width),
+                           static_cast<std::uint32_t>(tile->height),
+                           static_cast<std::uint32_t>(s)};
   const std::uint32_t vertices = 6U * kSegments * kSegments * faces;
-  const std::uint32_t groups = (shape.width * shape.height + 127) / 128;
   if (auto begun = commands.begin(); !begun) return begun;
   commands.draw(draw, {{{&scene, &field}}, gpu::push_of(where)}, vertices, tile->target);
   commands.copy_color(tile->target, tile->samples);
   commands.barrier();
-  commands.dispatch(
-      resolve, {{{&tile->samples, &tile->pixels}}, gpu::push_of(shape)}, {groups, 1, 1});
+  record_resolve(resolve, tile->samples, tile->pixels, shape, commands);
   commands.barrier();
   if (auto ended = commands.end(); !ended) return ended;
   return context->run(commands);
@@ -124,8 +120,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   auto draw = gpu::Pipeline::create_raster(
       **context, "block", shaders::block_vert, shaders::block_frag, {2, sizeof(TilePush)});
   if (!draw) return draw.error();
-  auto resolve = gpu::Pipeline::create_compute(
-      **context, "resolve", shaders::resolve_comp, {2, sizeof(ResolvePush)});
+  auto resolve = make_resolve_pass(**context);
   if (!resolve) return resolve.error();
   auto commands = gpu::Commands::create(**context);
   if (!commands) return commands.error();

@@ -16,6 +16,8 @@ Error become_render(const std::filesystem::path& programs, const RenderWish& wis
   for (const std::string& text : wish.materials) {
     words.insert(words.end(), {"--save-material", text});
   }
+  words.insert(words.end(), {"--draw", wish.draw});
+  if (!wish.device.empty()) words.insert(words.end(), {"--device", wish.device});
   if (wish.no_edits) words.emplace_back("--no-edits");
   if (wish.at_rest) words.emplace_back("--at-rest");
   if (wish.swing) words.emplace_back("--swing");

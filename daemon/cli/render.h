@@ -16,6 +16,8 @@ struct RenderWish {
   std::string stats;  ///< file; empty: for people, to standard error
   int threads = 0;    ///< 0: one a processor
   std::vector<std::string> materials;  ///< OBJECT=FILE.vdb: to be saved with their edits
+  std::string draw = "host";           ///< or vulkan
+  std::string device;                  ///< part of a Vulkan device's name; empty: the best
   bool no_edits = false;
   bool at_rest = false;  ///< without bending
   bool swing = false;    ///< bends over a turntable

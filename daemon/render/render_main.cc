@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -22,6 +23,7 @@
 #include "daemon/render/developed_picture.h"
 #include "daemon/render/render_report.h"
 #include "daemon/render/turntable.h"
+#include "render/raster/raster_renderer.h"
 #include "render/scene/scene_renderer.h"
 
 namespace opaline::daemon {
@@ -36,6 +38,8 @@ struct Arguments {
   int turntable = 0;
   fs::path stats;
   std::vector<std::string> materials;
+  std::string draw = "host";
+  std::string device;
   bool no_edits = false;
   bool at_rest = false;
   bool swing = false;
@@ -91,6 +95,13 @@ class Session {
     const auto renderer = SceneRenderer::create(
         first, team, [&](std::string_view what, double share) { show(what, 0.5 * share); }, stop);
     if (!renderer) return renderer.error().in(arguments_.scene.string());
+    if (arguments_.draw == "vulkan") {
+      render::RasterOptions options;
+      options.gpu.device.name = arguments_.device;
+      auto raster = render::RasterRenderer::create(options);
+      if (!raster) return raster.error();
+      raster_ = *std::move(raster);
+    }
     for (const std::string& text : arguments_.materials) {
       if (auto saved = save_material(**renderer, text); !saved) return saved;
     }
@@ -134,13 +145,25 @@ class Session {
     return ok();
   }
 
+  Result<Image<float>> drawn(SceneRenderer& renderer,
+                             const CameraModel& camera,
+                             const std::stop_token& stop) {
+    if (!raster_) return renderer.draw(camera, stop);
+    const auto start = std::chrono::steady_clock::now();
+    if (auto taken = raster_->take(renderer); !taken) return taken.error();
+    for (const std::string& what : raster_->left_out()) renderer.leave_out(what);
+    auto picture = raster_->draw(camera, scene_.picture.samples_per_axis, stop);
+    renderer.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    return picture;
+  }
+
   Result<void> picture(SceneRenderer& renderer, int k, int pictures, const std::stop_token& stop) {
     const TurnedView turn = turned(scene_, 360.0 * k / pictures);
     if (arguments_.swing) {
       if (auto bent = swing(renderer, static_cast<double>(k) / pictures, stop); !bent) return bent;
     }
     if (auto lit = renderer.light(turn.lights, stop); !lit) return lit;
-    const auto radiance = renderer.draw(render::camera_of(turn.camera, scene_.picture), stop);
+    const auto radiance = drawn(renderer, render::camera_of(turn.camera, scene_.picture), stop);
     if (!radiance) return radiance.error();
     if (k == 0) white_ = white_of(*radiance, scene_.picture);
     for (const Output& output : outputs_) {
@@ -170,6 +193,7 @@ class Session {
   std::vector<Output> outputs_;
   SystemClock clock_;
   ProgressView view_{terminal_options(), clock_};
+  std::unique_ptr<render::RasterRenderer> raster_;  // none: rays draw
   double white_ = 1.0;
 };
 
@@ -205,6 +229,12 @@ int program(int argc, char** argv) {
                  "This many pictures of the objects' full turn, numbered NAME_000 and on")
       ->check(CLI::Range(0, 100000));
   app.add_option("--stats", arguments.stats, "File for the statistics as JSON, in place of text");
+  app.add_option("--draw",
+                 arguments.draw,
+                 "host: rays on the processor; vulkan: rasteriser and shadow maps")
+      ->check(CLI::IsMember({"host", "vulkan"}))
+      ->capture_default_str();
+  app.add_option("--device", arguments.device, "Part of the name of the Vulkan device that draws");
   app.add_option("--save-material",
                  arguments.materials,
                  "OBJECT=FILE.vdb: the object's material with its edits; may be given again");

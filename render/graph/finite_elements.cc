@@ -20,7 +20,7 @@ LaneMatrix<double> pattern_of(const TetMesh& mesh) {
     }
   }
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   LaneMatrix<double> matrix;
   matrix.sinks.resize(mesh.vertices.size(), Lanes<double>::zero());
   matrix.entries.resize(pairs.size(), Lanes<double>::zero());

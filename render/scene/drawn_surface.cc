@@ -66,9 +66,12 @@ void DrawnSurface::bend(const Deformation& deformation) {
 }
 
 std::vector<float> DrawnSurface::spread_marks(const std::vector<bool>& of_coarse) const {
-  std::vector<float> marks(of_coarse.begin(), of_coarse.end());
-  for (const auto& [a, b] : parents_) marks.push_back(0.5F * (marks[a] + marks[b]));
-  return marks;
+  return spread_shares({of_coarse.begin(), of_coarse.end()});
+}
+
+std::vector<float> DrawnSurface::spread_shares(std::vector<float> shares) const {
+  for (const auto& [a, b] : parents_) shares.push_back(0.5F * (shares[a] + shares[b]));
+  return shares;
 }
 
 void DrawnSurface::refine(const SignedDistance& solid) {

@@ -28,6 +28,8 @@ class DrawnSurface {
   SurfaceLight spread(const SurfaceLight& of_coarse) const;
   /// 1 where a coarse vertex is marked, 0 where not, the mean between.
   std::vector<float> spread_marks(const std::vector<bool>& of_coarse) const;
+  std::vector<float> spread_shares(std::vector<float> of_coarse) const;
+  std::size_t coarse() const { return coarse_; }
 
  private:
   void refine(const SignedDistance& solid);

@@ -23,7 +23,7 @@ struct Look {
       marks{};  ///< of its vertices; above 1/2: shown in magenta, as wrong. Empty: none
   double mark_radiance = 0.0;  ///< of the magenta, W/(mm^2 sr)
   std::vector<float>
-      sky{};  ///< of an opaque one's vertices: the share of the environment that it sees, cosine-weighted
+      sky{};  ///< of the vertices: the share of the environment that they see, cosine-weighted, of a translucent one as it enters
 };
 
 /// Pictures of lit surfaces, by rays. A point shows, towards the camera,

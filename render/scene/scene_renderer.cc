@@ -48,6 +48,15 @@ void for_each(std::size_t count, ThreadTeam& team, const std::stop_token& stop, 
   });
 }
 
+/// Of each drawn vertex the share of the sky that its place sees; 1 where places are not vertices.
+std::vector<float> sky_share(const DrawnSurface& drawn, std::vector<float> places, double open) {
+  if (places.size() != drawn.coarse()) {
+    return std::vector<float>(drawn.mesh().vertices.size(), 1.0F);
+  }
+  for (float& value : places) value = static_cast<float>(value / open);
+  return drawn.spread_shares(std::move(places));
+}
+
 /// What the surface shows where its fluence is highest, about.
 double brightest(const Look& look) {
   float most = 0.0F;
@@ -157,6 +166,15 @@ Result<void> SceneRenderer::add_opaque(const ObjectOptions& object, std::stop_to
   return ok();
 }
 
+std::vector<SceneRenderer::DrawnObject> SceneRenderer::drawn() const {
+  std::vector<DrawnObject> objects(looks_.size());
+  for (std::size_t o = 0; o < looks_.size(); ++o) {
+    objects[o] = {opaque_[o].drawn.get(), &looks_[o], scene_.objects[o].shape.name == "plane"};
+  }
+  for (const Body& body : bodies_) objects[body.object].surface = &body.body->drawn();
+  return objects;
+}
+
 TranslucentBody* SceneRenderer::body(std::size_t object) {
   for (Body& body : bodies_) {
     if (body.object == static_cast<int>(object)) return body.body.get();
@@ -171,7 +189,7 @@ Result<std::size_t> SceneRenderer::bend(std::size_t object,
   std::size_t inverted = 0;
   if (TranslucentBody* const own = body(object)) {
     const auto bent = own->bend(options);
-    if (!bent) return bent;
+    if (!bent) return bent.error();
     inverted = *bent;
     looks_[object].marks = own->marks();
     surfaces_.move(static_cast<int>(object), own->drawn().mesh().vertices, own->drawn().normals());
@@ -233,10 +251,14 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
     const auto& places = bodies_[b].body->subsurface().places();
     const double ior = looks_[bodies_[b].object].ior;
     body_sky_[b].resize(places.size());
+    const auto passed = [ior](double cosine) { return 1.0 - fresnel_reflectance(cosine, ior); };
     for_each(places.size(), team_, stop, [&](std::size_t i) {
-      const auto passed = [ior](double cosine) { return 1.0 - fresnel_reflectance(cosine, ior); };
       body_sky_[b][i] = static_cast<float>(std::numbers::pi * share(places[i], passed));
     });
+    double open = 0.0;
+    for (const Vec3& d : directions) open += passed(d.z);
+    open *= std::numbers::pi / static_cast<double>(directions.size());
+    looks_[bodies_[b].object].sky = sky_share(bodies_[b].body->drawn(), body_sky_[b], open);
   }
   for (std::size_t o = 0; o < opaque_.size(); ++o) {
     if (!opaque_[o].drawn) continue;

@@ -70,6 +70,19 @@ class SceneRenderer {
   /// Linear radiance and coverage, as Painter says. Call light() first.
   Result<Image<float>> draw(const CameraModel& camera, std::stop_token stop);
 
+  /// An object's surface as it is drawn; valid until the scene changes.
+  struct DrawnObject {
+    const DrawnSurface* surface = nullptr;
+    const Look* look = nullptr;
+    bool is_plane = false;
+  };
+  std::vector<DrawnObject> drawn() const;
+  const std::vector<LightOptions>& lights() const { return lights_; }
+  const EnvironmentOptions& environment() const { return scene_.environment; }
+  /// For somebody else who draws the scene: what that leaves out, and how long it took.
+  void leave_out(std::string what);
+  void took(double draw_seconds) { statistics_.draw_seconds = draw_seconds; }
+
   const SceneStatistics& statistics() const { return statistics_; }
 
  private:
@@ -99,7 +112,6 @@ class SceneRenderer {
                 double ior) const;
   void let_in(const Body& body, Entering& light, std::stop_token stop);
   void send_beams(const Body& body, Entering& light, std::stop_token stop);
-  void leave_out(std::string what);
   void leave_out_dark();
 
   Scene scene_;

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+
+namespace opaline::bench {
+
+/// Median milliseconds of frames through the rasteriser.
+struct RasterFrame {
+  double take_ms = 0.0;  ///< sending the surface with its light, and drawing the shadow map
+  double draw_ms = 0.0;  ///< the picture, back on the host
+  double whole_ms = 0.0;
+  std::size_t triangles = 0;
+};
+/// Ends the program where there is no device.
+RasterFrame raster_frame();
+
+}  // namespace opaline::bench
