@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/exposure_times.h"
 #include "calibration/sensor_noise.h"
 #include "calibration/step.h"
 
@@ -16,11 +17,8 @@ namespace {
 constexpr double kRatio = 1.5;
 constexpr double kCurvesDiffer = 0.01;  // of full scale
 constexpr double kTimesOff = 0.01;
-constexpr double kUnsure = 0.001;
 constexpr double kGainUnsure = 0.03;
 constexpr double kGainsDiffer = 0.08;
-constexpr double kLowest = 0.02;  // of the code range, for the times
-constexpr double kHighest = 0.85;
 
 Result<StepRecord> refused(StepRecord record, std::string gate, const std::string& why) {
   record.gates.push_back({std::move(gate), 2.0, 1.0, "", why});
@@ -59,64 +57,18 @@ Result<void> find_response(StepContext& context, const Stack& stack, StepRecord&
   return ok();
 }
 
-// How many times as long as the exposure before it an exposure was, by the light of the samples that both tell of, which are
-// chosen by the frames that do not count, so that noise chooses none.
-struct Growth {
-  double times = 0.0;
-  double deviation = 1.0;  // standard, relative
-};
-
-Growth growth(const Stack& stack,
-              std::size_t j,
-              CodeRange range,
-              const std::vector<double>& linear,
-              const Image<std::uint8_t>& good) {
-  const double low = range.black + kLowest * (range.clipping - range.black);
-  const double high = range.black + kHighest * (range.clipping - range.black);
-  std::array<double, 2> sum{};
-  std::array<double, 2> variance{};
-  for (std::size_t i = 0; i < stack.first[j].pixels.samples().size(); ++i) {
-    if (good.samples()[i / 3] == 0 || stack.second[j - 1].pixels.samples()[i] < low ||
-        stack.second[j].pixels.samples()[i] > high)
-      continue;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const double first = linear[stack.first[j - 1 + k].pixels.samples()[i]];
-      const double difference = first - linear[stack.second[j - 1 + k].pixels.samples()[i]];
-      sum[k] += first;
-      variance[k] += 0.5 * difference * difference;
-    }
-  }
-  if (!(sum[0] > 0.0 && sum[1] > 0.0)) return {};
-  return {sum[1] / sum[0],
-          std::sqrt(variance[0] / (sum[0] * sum[0]) + variance[1] / (sum[1] * sum[1]))};
-}
-
-// The largest departure of a measured exposure from the reported one, their scale being free, as far as enough samples tell.
 double exposure_error(StepContext& context, const Stack& stack, StepRecord& record) {
-  const auto linear = linear_codes(linear_camera(context));
-  const auto good = good_pixels(context);
-  std::vector<double> off{0.0};
-  double chain = 0.0;
-  for (std::size_t j = 1; j < stack.first.size(); ++j) {
-    const double told =
-        seconds_of(stack.first[j].exposure) / seconds_of(stack.first[j - 1].exposure);
-    const Growth seen = growth(stack, j, code_range(context), linear, good);
-    if (seen.deviation > kUnsure) break;
-    chain += std::log(seen.times / told);
-    off.push_back(chain);
-  }
-  std::vector<double> sorted = off;
-  std::ranges::sort(sorted);
-  const double middle = sorted[sorted.size() / 2];
-  double most = 0.0;
+  const ExposureTimes times = measure_exposures(stack.first,
+                                                stack.second,
+                                                code_range(context),
+                                                linear_codes(linear_camera(context)),
+                                                good_pixels(context));
   nlohmann::json measured = nlohmann::json::array();
-  for (std::size_t j = 0; j < off.size(); ++j) {
-    most = std::max(most, std::abs(std::expm1(off[j] - middle)));
-    const double said = seconds_of(stack.first[j].exposure);
-    measured.push_back({{"reported_s", said}, {"measured_s", said * std::exp(off[j] - middle)}});
-  }
+  for (const auto& one : times.exposures)
+    measured.push_back({{"reported_s", one.reported}, {"measured_s", one.reported * one.factor}});
   record.values["exposures"] = std::move(measured);
-  return most;
+  context.record.measured.exposure_factors = times.corrections();
+  return times.largest_error;
 }
 
 Result<std::vector<PhotonTransfer>> transfer_noise(StepContext& context, const Stack& stack) {

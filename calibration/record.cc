@@ -73,6 +73,8 @@ ordered_json to_json(const Measured& m) {
   put("projector_gamma", m.projector_gamma);
   put("gain_electrons_per_code", m.gain_electrons_per_code);
   put("read_noise_electrons", m.read_noise_electrons);
+  for (const capture::ExposureFactor& f : m.exposure_factors)
+    out["exposure_factors"].push_back({{"reported_s", f.reported_s}, {"factor", f.factor}});
   return out;
 }
 
@@ -128,6 +130,8 @@ Measured measured_from(const json& in) {
   m.projector_gamma = number("projector_gamma");
   m.gain_electrons_per_code = number("gain_electrons_per_code");
   m.read_noise_electrons = number("read_noise_electrons");
+  for (const json& f : in.value("exposure_factors", json::array()))
+    m.exposure_factors.push_back({f.at("reported_s").get<double>(), f.at("factor").get<double>()});
   return m;
 }
 
@@ -235,6 +239,7 @@ capture::StationCalibration with_measured(capture::StationCalibration given,
     for (double& s : camera.sensitivity) s *= gain / camera.gain_electrons_per_code;
     camera.gain_electrons_per_code = gain;
   }
+  camera.exposure_factors = measured.exposure_factors;
   if (measured.read_noise_electrons) camera.read_noise_electrons = *measured.read_noise_electrons;
   if (measured.clipping_code) {
     camera.full_well_electrons = 0.0;

@@ -60,6 +60,7 @@ struct Measured {
   std::optional<double> projector_gamma;
   std::optional<double> gain_electrons_per_code;
   std::optional<double> read_noise_electrons;
+  std::vector<capture::ExposureFactor> exposure_factors;  ///< empty: the camera reports them right
 };
 
 enum class RecordState : std::uint8_t { kIncomplete, kRefused, kAccepted };
@@ -93,7 +94,7 @@ std::string to_text(const Record& record);
 /// Errors: kInvalidArgument for what is damaged, saying where, or written by a newer version.
 Result<Record> record_from_text(std::string_view text, const std::string& file);
 
-/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise and hot pixels,
+/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times and hot pixels,
 /// and the projector's gamma, as measured. The sensitivity follows the gain, so that codes per radiance, which is what the one
 /// who gave it had measured, stay as given.
 capture::StationCalibration with_measured(capture::StationCalibration given,

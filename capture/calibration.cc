@@ -111,6 +111,12 @@ Result<void> validate(const StationCalibration& calibration) {
       {black >= 0.0 && black < c.max_code(), "camera.black_level", black, ">= 0, below full scale"},
       {c.gain_electrons_per_code > 0.0, "camera.gain", c.gain_electrons_per_code, "> 0"},
       {c.full_well_electrons >= 0.0, "camera.full_well", c.full_well_electrons, ">= 0"},
+      {std::ranges::all_of(
+           c.exposure_factors,
+           [](const ExposureFactor& f) { return f.reported_s > 0.0 && f.factor > 0.0; }),
+       "camera.exposure_factors",
+       c.exposure_factors.empty() ? 1.0 : c.exposure_factors.front().factor,
+       "seconds and factors > 0"},
       {c.read_noise_electrons >= 0.0, "camera.read_noise", c.read_noise_electrons, ">= 0"},
       {c.vignetting.least() > 0.0,
        "camera.vignetting",
@@ -152,6 +158,18 @@ double clipping_code(const CameraCalibration& camera) {
     (electrons_from_code(camera, middle).signal < full_well ? low : high) = middle;
   }
   return high;
+}
+
+double exposed_seconds(const CameraCalibration& camera, double reported) {
+  const auto& known = camera.exposure_factors;
+  if (known.empty()) return reported;
+  const auto above = std::ranges::lower_bound(known, reported, {}, &ExposureFactor::reported_s);
+  if (above == known.begin()) return reported * above->factor;
+  const ExposureFactor& below = *(above - 1);
+  if (above == known.end()) return reported * below.factor;
+  const double share =
+      std::log(reported / below.reported_s) / std::log(above->reported_s / below.reported_s);
+  return reported * (below.factor + share * (above->factor - below.factor));
 }
 
 Image<float> camera_vignetting(const CameraCalibration& camera) {

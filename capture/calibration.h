@@ -30,6 +30,12 @@ struct Vignetting {
   double least() const;  ///< of it in the picture, 0 <= r <= 1
 };
 
+/// How long an exposure truly is, over what the camera reports, as measured at one exposure.
+struct ExposureFactor {
+  double reported_s = 0.0;  ///< > 0
+  double factor = 1.0;      ///< > 0
+};
+
 /// What the capture believes of its camera. A pixel sees
 ///
 ///   electrons  = sensitivity . radiance . exposure . vignetting + leaks
@@ -47,6 +53,7 @@ struct CameraCalibration {
   double read_noise_electrons = 3.0;                 ///< standard deviation
   Vignetting vignetting;                             ///< about the picture's middle
   std::array<double, 3> sensitivity{1e9, 1e9, 1e9};  ///< electrons per (W/(mm^2 sr) s), per channel
+  std::vector<ExposureFactor> exposure_factors;      ///< by reported_s, rising; empty: all 1
   /// Known ones, (x, y); others are found in the black frames.
   std::vector<std::pair<int, int>> hot_pixels;
 
@@ -90,6 +97,10 @@ Electrons electrons_from_code(const CameraCalibration& camera, double code);
 
 /// The code at which pixels clip: the highest, or that of a full well below full scale.
 double clipping_code(const CameraCalibration& camera);
+
+/// The seconds of an exposure that the camera reports as `reported`: times its factor, which between measured exposures goes
+/// with the logarithm of the time, and beyond them stays.
+double exposed_seconds(const CameraCalibration& camera, double reported);
 
 /// Vignetting of each camera pixel, 1 channel.
 Image<float> camera_vignetting(const CameraCalibration& camera);

@@ -40,7 +40,7 @@ bool can_retry(ErrorCode code) {
 BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
                          const CameraCalibration& camera,
                          const Image<std::uint8_t>& seen)
-    : frames_(std::move(frames)), footprint_(seen) {
+    : frames_(std::move(frames)), camera_(camera), footprint_(seen) {
   std::vector<const Image<std::uint16_t>*> pictures;
   for (const CapturedFrame& captured : frames_) pictures.push_back(&captured.frame.pixels);
   hot_ = find_hot_pixels(camera, pictures);
@@ -86,8 +86,8 @@ std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const 
   if (black == frames_.end()) return std::nullopt;
   return ExposurePair{&light.frame.pixels,
                       &black->frame.pixels,
-                      seconds(light.frame.exposure),
-                      seconds(black->frame.exposure),
+                      exposed_seconds(camera_, seconds(light.frame.exposure)),
+                      exposed_seconds(camera_, seconds(black->frame.exposure)),
                       others_[static_cast<std::size_t>(black - frames_.begin())]};
 }
 

@@ -46,12 +46,13 @@ class BlackFrames {
   /// Pixels that see the sample and are not hot: 1. Only these tell light from dark, since a hot
   /// one saturates in a long exposure without any light.
   const Image<std::uint8_t>& footprint() const { return footprint_; }
-  /// The pair of a frame with the blacks of its exposure; none when there is no such black. We outlive the pair.
+  /// The pair of a frame with the blacks of its exposure, their times as exposed_seconds() has them; none when there is no such black. We outlive the pair.
   std::optional<ExposurePair> pair(const CapturedFrame& light) const;
 
  private:
   using Pictures = std::vector<const Image<std::uint16_t>*>;
   std::vector<CapturedFrame> frames_;
+  CameraCalibration camera_;
   std::vector<Pictures> others_;  ///< of each frame: those of the same exposure
   Image<std::uint8_t> hot_;
   Image<std::uint8_t> footprint_;

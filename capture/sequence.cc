@@ -42,7 +42,7 @@ Result<std::uint64_t> free_on_disk(const fs::path& directory) {
   return static_cast<std::uint64_t>(space.available);
 }
 
-double exposed_seconds(std::span<const CapturedFrame> frames) {
+double seconds_asked(std::span<const CapturedFrame> frames) {
   double sum = 0.0;
   for (const CapturedFrame& frame : frames) sum += seconds(frame.exposure_asked);
   return sum;
@@ -317,7 +317,7 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
                                        {{"region", light.name},
                                         {"held_out", light.held_out},
                                         {"exposures", taken->frames.size()},
-                                        {"exposed_s", exposed_seconds(taken->frames)},
+                                        {"exposed_s", seconds_asked(taken->frames)},
                                         {"retaken", taken->retaken}});
   if (!noted) return noted.error();
   return Frames{std::move(taken->frames), taken->lit};
