@@ -12,7 +12,7 @@ void print_figure(std::string_view figure,
                   double value,
                   std::string_view unit);
 
-/// The middle of at least one value; of an even number the upper of the two.
+/// The middle of the values; of an even number the upper of the two; of none, not a number.
 double median(std::vector<double> values);
 
 /// What this program has held at most since it began, or since the last reset, MB.

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/scene/lighting.h"
+
 namespace opaline::render {
 namespace {
-
-bool is_black(const Colour& colour) { return std::ranges::max(colour) <= 0.0; }
 
 Result<void> check_colour(const Colour& colour, const char* what, double lowest, double highest) {
   for (const double value : colour) {

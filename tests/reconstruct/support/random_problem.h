@@ -20,7 +20,7 @@ struct Case {
   CameraLaw camera = CameraLaw::kSurface;
 };
 
-inline std::string case_name(const testing::TestParamInfo<Case>& info) { return info.param.name; }
+inline std::string case_name(const ::testing::TestParamInfo<Case>& info) { return info.param.name; }
 
 inline ChannelCoefficients random_medium(std::size_t cells, unsigned seed) {
   std::mt19937 random(seed);
@@ -74,55 +74,55 @@ inline constexpr auto kCentroid = diffusion::Deposit::kCentroid;
 inline constexpr auto kCell = diffusion::Deposit::kCell;
 
 /// Every way for light to enter and to be seen.
-inline const auto kEveryLight =
-    testing::Values(Case{"BackLitCentroid", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"BackLitCell", kCollimated, kCell, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"BackLitSurface", kSurface, kCentroid, Face::kZMin, Face::kZMax, 0.0},
-                    Case{"FrontLitCentroid", kCollimated, kCentroid, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FrontLitCell", kCollimated, kCell, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FrontLitSurface", kSurface, kCentroid, Face::kZMax, Face::kZMax, 0.0},
-                    Case{"FromTheSide", kCollimated, kCentroid, Face::kXMax, Face::kYMin, 0.0},
-                    Case{"Regularized", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 2.0},
-                    Case{"TotalVariation",
-                         kCollimated,
-                         kCentroid,
-                         Face::kZMin,
-                         Face::kZMax,
-                         2.0,
-                         Smoothness::kTotalVariation});
+inline const auto kEveryLight = ::testing::Values(
+    Case{"BackLitCentroid", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 0.0},
+    Case{"BackLitCell", kCollimated, kCell, Face::kZMin, Face::kZMax, 0.0},
+    Case{"BackLitSurface", kSurface, kCentroid, Face::kZMin, Face::kZMax, 0.0},
+    Case{"FrontLitCentroid", kCollimated, kCentroid, Face::kZMax, Face::kZMax, 0.0},
+    Case{"FrontLitCell", kCollimated, kCell, Face::kZMax, Face::kZMax, 0.0},
+    Case{"FrontLitSurface", kSurface, kCentroid, Face::kZMax, Face::kZMax, 0.0},
+    Case{"FromTheSide", kCollimated, kCentroid, Face::kXMax, Face::kYMin, 0.0},
+    Case{"Regularized", kCollimated, kCentroid, Face::kZMin, Face::kZMax, 2.0},
+    Case{"TotalVariation",
+         kCollimated,
+         kCentroid,
+         Face::kZMin,
+         Face::kZMax,
+         2.0,
+         Smoothness::kTotalVariation});
 
 /// The same seen along refracted rays.
-inline const auto kEveryLightAlongRays = testing::Values(Case{"BackLitRays",
-                                                              kCollimated,
-                                                              kCentroid,
-                                                              Face::kZMin,
-                                                              Face::kZMax,
-                                                              0.0,
-                                                              Smoothness::kH1,
-                                                              CameraLaw::kRefractedRay},
-                                                         Case{"FrontLitRays",
-                                                              kCollimated,
-                                                              kCentroid,
-                                                              Face::kZMax,
-                                                              Face::kZMax,
-                                                              0.0,
-                                                              Smoothness::kH1,
-                                                              CameraLaw::kRefractedRay},
-                                                         Case{"FrontLitSurfaceRays",
-                                                              kSurface,
-                                                              kCentroid,
-                                                              Face::kZMax,
-                                                              Face::kZMax,
-                                                              0.0,
-                                                              Smoothness::kH1,
-                                                              CameraLaw::kRefractedRay},
-                                                         Case{"FromTheSideRays",
-                                                              kCollimated,
-                                                              kCentroid,
-                                                              Face::kXMax,
-                                                              Face::kYMin,
-                                                              0.0,
-                                                              Smoothness::kH1,
-                                                              CameraLaw::kRefractedRay});
+inline const auto kEveryLightAlongRays = ::testing::Values(Case{"BackLitRays",
+                                                                kCollimated,
+                                                                kCentroid,
+                                                                Face::kZMin,
+                                                                Face::kZMax,
+                                                                0.0,
+                                                                Smoothness::kH1,
+                                                                CameraLaw::kRefractedRay},
+                                                           Case{"FrontLitRays",
+                                                                kCollimated,
+                                                                kCentroid,
+                                                                Face::kZMax,
+                                                                Face::kZMax,
+                                                                0.0,
+                                                                Smoothness::kH1,
+                                                                CameraLaw::kRefractedRay},
+                                                           Case{"FrontLitSurfaceRays",
+                                                                kSurface,
+                                                                kCentroid,
+                                                                Face::kZMax,
+                                                                Face::kZMax,
+                                                                0.0,
+                                                                Smoothness::kH1,
+                                                                CameraLaw::kRefractedRay},
+                                                           Case{"FromTheSideRays",
+                                                                kCollimated,
+                                                                kCentroid,
+                                                                Face::kXMax,
+                                                                Face::kYMin,
+                                                                0.0,
+                                                                Smoothness::kH1,
+                                                                CameraLaw::kRefractedRay});
 
 }  // namespace opaline::reconstruct::testing_problem
