@@ -92,6 +92,13 @@ std::span<float> Buffer::floats() {
   return {reinterpret_cast<float*>(bytes.data()), bytes.size() / sizeof(float)};
 }
 
+Result<Buffer> create_filled(Context& context, std::span<const std::byte> from) {
+  auto buffer = Buffer::create(context, from.size(), Memory::kDevice);
+  if (!buffer) return buffer;
+  if (auto sent = upload(context, from, *buffer); !sent) return sent.error();
+  return buffer;
+}
+
 Result<void> upload(Context& context, std::span<const std::byte> from, Buffer& to) {
   ENSURE(from.size() <= to.bytes());
   auto staging = Buffer::create(context, from.size(), Memory::kHost);

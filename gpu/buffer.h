@@ -43,6 +43,9 @@ class Buffer {
   std::unique_ptr<Handles> handles_;
 };
 
+/// A device buffer of these bytes; waits.
+Result<Buffer> create_filled(Context& context, std::span<const std::byte> from);
+
 /// Copies to or from a device buffer through a host one made for the occasion; waits.
 Result<void> upload(Context& context, std::span<const std::byte> from, Buffer& to);
 Result<void> download(Context& context, const Buffer& from, std::span<std::byte> to);

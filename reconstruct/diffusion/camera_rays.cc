@@ -5,6 +5,7 @@
 
 #include "base/ensure.h"
 #include "reconstruct/diffusion/centroid.h"
+#include "reconstruct/diffusion/face_step.h"
 
 namespace opaline::reconstruct::diffusion {
 namespace {
@@ -30,11 +31,7 @@ class CameraRays::Raster {
         face_(face),
         spacing_{block.spacing()[axis_of(face) == 0 ? 1 : 0],
                  block.spacing()[axis_of(face) == 2 ? 1 : 2]},
-        layers_(static_cast<std::size_t>(block.cells()[axis_of(face)])) {
-    const std::ptrdiff_t strides[] = {
-        1, block.nx, static_cast<std::ptrdiff_t>(block.nx) * block.ny};
-    inwards_ = is_max(face) ? -strides[axis_of(face)] : strides[axis_of(face)];
-  }
+        layers_(static_cast<std::size_t>(block.cells()[axis_of(face)])) {}
 
   int width() const { return block_.face_width(face_); }
   int height() const { return block_.face_height(face_); }
@@ -42,7 +39,8 @@ class CameraRays::Raster {
   double column_spacing() const { return spacing_[0]; }
   double row_spacing() const { return spacing_[1]; }
   std::size_t cell(int column, int row, std::size_t layer) const {
-    return block_.cell_behind(face_, column, row) + static_cast<std::ptrdiff_t>(layer) * inwards_;
+    return block_.cell_behind(face_, column, row) +
+           static_cast<std::ptrdiff_t>(layer) * inwards(block_, face_);
   }
   std::size_t step(int columns, int rows) const {
     return block_.cell_behind(face_, std::min(columns, width() - 1), std::min(rows, height() - 1)) -
@@ -54,7 +52,6 @@ class CameraRays::Raster {
   Face face_;
   std::array<double, 2> spacing_;
   std::size_t layers_;
-  std::ptrdiff_t inwards_;
 };
 
 CameraRays::CameraRays(const Medium& medium,

@@ -4,6 +4,7 @@
 
 #include "base/ensure.h"
 #include "reconstruct/diffusion/centroid.h"
+#include "reconstruct/diffusion/face_step.h"
 
 namespace opaline::reconstruct::diffusion {
 std::string_view to_string(SourceModel model) {
@@ -21,8 +22,7 @@ FaceSource::FaceSource(const Medium& medium,
     : boundary_(boundary), options_(options) {
   const Block& block = medium.block;
   const int axis = axis_of(face);
-  const std::ptrdiff_t strides[] = {1, block.nx, static_cast<std::ptrdiff_t>(block.nx) * block.ny};
-  const std::ptrdiff_t inwards = is_max(face) ? -strides[axis] : strides[axis];
+  const std::ptrdiff_t step = inwards(block, face);
   area_ = block.face_cell_area(face);
   h_ = block.spacing()[axis];
   depth_ = static_cast<std::size_t>(block.cells()[axis]);
@@ -31,7 +31,7 @@ FaceSource::FaceSource(const Medium& medium,
     for (int col = 0; col < block.face_width(face); ++col) {
       std::size_t cell = block.cell_behind(face, col, row);
       double arriving = 1.0;
-      for (std::size_t n = 0; n < depth_; ++n, cell += inwards) {
+      for (std::size_t n = 0; n < depth_; ++n, cell += step) {
         rays_.push_back(ray_cell(medium, cell, arriving));
         arriving = rays_.back().remaining;
       }

@@ -17,6 +17,7 @@ const int kCentroid = 2;
 const int kLit = 4;    // the face at hand is the lit one
 const int kSeen = 8;   // the face at hand is the seen one
 const int kFirst = 16; // sums over the illuminations start here
+const int kAlongRays = 32;  // the camera sees along refracted rays
 bool has(int flag) { return (push.ratio.w & flag) != 0; }
 
 ivec3 cell_of(int t, ivec4 n) { return ivec3(t % n.x, t / n.x % n.y, t / (n.x * n.y)); }

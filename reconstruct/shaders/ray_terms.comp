@@ -6,7 +6,8 @@
 //   dJ/dsigma_a,n = -3 kappa P D lambda
 //   dJ/dkappa_n   = -3 sigma_a P D lambda + (h / (3 kappa^2)) (sum_(m>n) lambda_m Q_m - P alpha' E lambda) + beta' terms
 //
-// set 0: 0 kappa and sigma_a, 1 rays, 2 q, 3 r, 4 psi, 5 its low part (read), 6 d/dkappa, d/dsigma_a (read and write)
+// set 0: 0 kappa and sigma_a, 1 rays, 2 q, 3 r (of a ray's Phi along rays), 4 psi, 5 its low part, 6 camera gains (read),
+//        7 d/dkappa, d/dsigma_a (read and write)
 // Size: one thread a ray, 128 along the lit face, over all groups; from the far end, for the sum.
 #include "model.glsl"
 layout(std430, binding = 0) readonly buffer Coefficients { vec2 coefficient[]; };
@@ -15,7 +16,8 @@ layout(std430, binding = 2) readonly buffer Irradiance { vec4 irradiance[]; };
 layout(std430, binding = 3) readonly buffer Rims { vec4 rim[]; };
 layout(std430, binding = 4) readonly buffer Psi { vec4 psi[]; };
 layout(std430, binding = 5) readonly buffer PsiLow { vec4 psi_low[]; };
-layout(std430, binding = 6) buffer Gradient { vec2 gradient[]; };
+layout(std430, binding = 6) readonly buffer Camera { vec2 camera[]; };
+layout(std430, binding = 7) buffer Gradient { vec2 gradient[]; };
 #include "ray_cell.glsl"
 
 void main() {
@@ -27,7 +29,8 @@ void main() {
   for (int group = 0; group < push.face.y; ++group) {
     const int n_face = group * face_count() + f;
     const vec4 power = area_of(axis) * irradiance[n_face];
-    const vec4 rim_here = has(kSeen) ? rim[n_face] / area_of(axis) : vec4(0);
+    vec4 rim_here = has(kSeen) ? rim[n_face] / area_of(axis) : vec4(0);
+    if (has(kSeen) && has(kAlongRays)) rim_here *= camera[f].x > 0.0 ? camera[f].y / camera[f].x : 0.0;
     vec4 beyond = vec4(0);
     int cell = cell_behind(f) + (depth - 1) * face_inwards();
     for (int n = depth - 1; n >= 0; --n, cell -= face_inwards()) {

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // What a lit or seen face adds to -a sum psi phi of its cells: sum r (phi - S) + a psi S, over the illuminations.
-//                                                                  (reconstruct/gradient.h; r only seen, S only lit)
+//                                                                  (reconstruct/gradient.h; r only seen and not along rays, S only lit)
 // set 0: 0 q of the lit face, 1 r, 2 phi, 3 psi (read), 4 the face's terms (read and write)
 // Size: one thread a cell of the face, 128 along it, over all groups.
 #include "model.glsl"
@@ -23,7 +23,7 @@ void main() {
     vec4 source = vec4(0);
     if (has(kLit) && !has(kCollimated)) source = push.surface.y * irradiance[n];
     sum += area * dot(psi[at], source);
-    if (has(kSeen)) sum += dot(rim[n], phi[at] - source);
+    if (has(kSeen) && !has(kAlongRays)) sum += dot(rim[n], phi[at] - source);
   }
   terms[f] = sum;
 }

@@ -52,11 +52,7 @@ double mean_square(const ChannelProblem& problem) {
 }
 
 Result<gpu::Buffer> send(gpu::Context& context, const Values& values) {
-  const auto bytes = std::as_bytes(std::span(values));
-  auto buffer = gpu::Buffer::create(context, bytes.size(), gpu::Memory::kDevice);
-  if (!buffer) return buffer;
-  if (auto sent = gpu::upload(context, bytes, *buffer); !sent) return sent.error();
-  return buffer;
+  return gpu::create_filled(context, std::as_bytes(std::span(values)));
 }
 
 /// Rasters of some illuminations, four to a vec4, group after group; dark where there are no more.
@@ -118,7 +114,8 @@ Result<void> DeviceObjective::plan() {
   const std::uint64_t most = std::min(device.max_binding_bytes, device.max_allocation_bytes);
   const std::uint64_t all = (problem_.illuminations.size() + kLanes - 1) / kLanes;
   const std::uint64_t free = context.memory_left() / 10 * 9;
-  const std::uint64_t fixed = bytes_of_cell() * cells;
+  const std::uint64_t rays = problem_.rays.empty() ? 0 : DeviceCameraRays::kBytesOfCell;
+  const std::uint64_t fixed = (bytes_of_cell() + rays) * cells;
   const std::uint64_t group = (bytes_of_group() + kSolutionBytes) * cells;
   if (workgroups(cells) > device.max_groups_x || 16 * cells > most || fixed + group > free)
     return unavailable(
@@ -138,6 +135,11 @@ Result<void> DeviceObjective::allocate() {
   auto medium = DeviceMedium::create(context, problem_.block);
   if (!medium) return medium.error();
   medium_.push_back(*std::move(medium));
+  if (!problem_.rays.empty()) {
+    auto rays = DeviceCameraRays::create(context, problem_);
+    if (!rays) return rays.error();
+    camera_rays_ = *std::move(rays);
+  }
   auto fields = DeviceFields::create(context, medium_[0].shapes(), groups_, Staging::kNone);
   if (!fields) return fields.error();
   fields_.push_back(*std::move(fields));
@@ -235,6 +237,7 @@ ModelPush DeviceObjective::push_for(Face face, std::int32_t flags) const {
   if (problem_.source.deposit == diffusion::Deposit::kCentroid) flags |= kCentroid;
   if (face == problem_.lit_face) flags |= kLit;
   if (face == problem_.seen_face) flags |= kSeen;
+  if (camera_rays_) flags |= kAlongRays;
   push.ratio[3] = flags;
   push.face = {
       static_cast<std::int32_t>(face), groups_, static_cast<std::int32_t>(problem_.seen_face), 0};
@@ -297,11 +300,19 @@ void DeviceObjective::gather(const Turn& turn, const Solutions& s, std::int32_t 
       {&turn.irradiance, &turn.rims, &s.fluence.high, &s.adjoint.high, &work_[kLitTerms]},
       lit_push,
       lit);
-  if (problem_.seen_face != problem_.lit_face)
+  if (camera_rays_) {
+    camera_rays_->gather(recorder_,
+                         model_,
+                         turn.irradiance,
+                         turn.rims,
+                         s.fluence,
+                         push_for(problem_.seen_face, first));
+  } else if (problem_.seen_face != problem_.lit_face) {
     run(ModelKernel::kRimTerms,
         {&turn.irradiance, &turn.rims, &s.fluence.high, &s.adjoint.high, &work_[kSeenTerms]},
         push_for(problem_.seen_face, first),
         workgroups(problem_.camera.size()));
+  }
   if (problem_.source.model != diffusion::SourceModel::kCollimated) return;
   run(ModelKernel::kRayTerms,
       {&coefficients,
@@ -310,9 +321,24 @@ void DeviceObjective::gather(const Turn& turn, const Solutions& s, std::int32_t 
        &turn.rims,
        &s.adjoint.high,
        &s.adjoint.low,
+       &work_[kCamera],
        &work_[kRayGradient]},
       lit_push,
       lit);
+}
+
+void DeviceObjective::record_adjoint_source(const Turn& turn, const ModelPush& seen) {
+  if (camera_rays_) {
+    camera_rays_->source(recorder_, model_, turn.rims, work_[kB], seen);
+    return;
+  }
+  recorder_.fill_zero(work_[kB]);
+  recorder_.barrier();
+  run(ModelKernel::kAdjointSource,
+      {&medium_[0].coefficients(), &turn.rims, &work_[kB]},
+      seen,
+      workgroups(problem_.camera.size()),
+      groups_);
 }
 
 Result<void> DeviceObjective::take_turn(
@@ -326,6 +352,8 @@ Result<void> DeviceObjective::take_turn(
       workgroups(problem_.block.face_cell_count(problem_.lit_face)),
       groups_);
   if (auto solved = solve(turn, s.fluence, stop); !solved) return solved;
+  if (camera_rays_)
+    camera_rays_->look(recorder_, model_, turn.irradiance, s.fluence, turn.rims, seen);
   run(ModelKernel::kObserve,
       {&coefficients,
        &work_[kRayCells],
@@ -339,13 +367,7 @@ Result<void> DeviceObjective::take_turn(
        &sums.partials()},
       seen,
       kSumGroups);
-  recorder_.fill_zero(work_[kB]);
-  recorder_.barrier();
-  run(ModelKernel::kAdjointSource,
-      {&coefficients, &turn.rims, &work_[kB]},
-      seen,
-      workgroups(problem_.camera.size()),
-      groups_);
+  record_adjoint_source(turn, seen);
   if (auto solved = solve(turn, s.adjoint, stop); !solved) return solved.error().in("adjoint");
   gather(turn, s, first);
   return ok();
@@ -362,6 +384,8 @@ Result<void> DeviceObjective::evaluate(const gpu::Buffer& p,
       {&coefficients, &work_[kRayCells]},
       push,
       workgroups(problem_.block.face_cell_count(problem_.lit_face)));
+  const ModelPush seen = push_for(problem_.seen_face, 0);
+  if (camera_rays_) camera_rays_->trace(recorder_, model_, coefficients, seen);
   for (std::size_t t = 0; t < turns_.size(); ++t) {
     Solutions& solutions = solutions_[keep_ ? t : 0];
     if (!keep_) {
@@ -371,6 +395,8 @@ Result<void> DeviceObjective::evaluate(const gpu::Buffer& p,
     auto done = take_turn(turns_[t], solutions, t == 0 ? kFirst : 0, sums, stop);
     if (!done) return done;
   }
+  if (camera_rays_)
+    camera_rays_->add_gradient(recorder_, model_, coefficients, work_[kRayGradient], seen);
   run(ModelKernel::kEdges,
       {&p, &coefficients, &work_[kEdgeWeights], &sums.partials()},
       push,

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include "reconstruct/channel_problem.h"
+#include "reconstruct/vulkan/device_camera_rays.h"
 #include "reconstruct/vulkan/device_medium.h"
 #include "reconstruct/vulkan/device_passes.h"
 #include "reconstruct/vulkan/sums.h"
@@ -80,6 +82,7 @@ class DeviceObjective {
                          std::int32_t first,
                          const Sums& sums,
                          const std::stop_token& stop);
+  void record_adjoint_source(const Turn& turn, const ModelPush& seen);
   void gather(const Turn& turn, const Solutions& solutions, std::int32_t first);
   void run(ModelKernel kernel,
            std::initializer_list<const gpu::Buffer*> buffers,
@@ -96,8 +99,9 @@ class DeviceObjective {
   int groups_ = 0;  // of a turn
   bool keep_ = false;
   long solves_ = 0;
-  std::vector<DeviceMedium> medium_;  // one
-  std::vector<DeviceFields> fields_;  // one, for the largest turn
+  std::vector<DeviceMedium> medium_;             // one
+  std::optional<DeviceCameraRays> camera_rays_;  // none with the surface's camera law
+  std::vector<DeviceFields> fields_;             // one, for the largest turn
   std::vector<Turn> turns_;
   std::vector<Solutions> solutions_;  // one a turn, or one for all
   // b; rays; products; ray terms; the prior's weights; terms of the lit and of the seen face; camera gains

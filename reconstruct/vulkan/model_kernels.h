@@ -20,7 +20,14 @@ struct ModelPush {
   std::array<float, 4> smoothness{};
 };
 
-enum Flag : std::int32_t { kCollimated = 1, kCentroid = 2, kLit = 4, kSeen = 8, kFirst = 16 };
+enum Flag : std::int32_t {
+  kCollimated = 1,
+  kCentroid = 2,
+  kLit = 4,
+  kSeen = 8,
+  kFirst = 16,
+  kAlongRays = 32
+};
 
 /// Push constants of the minimisation's kernels: reconstruct/shaders/vectors.glsl.
 struct VectorPush {
@@ -43,6 +50,12 @@ enum class ModelKernel : std::uint8_t {
   kGather,
   kRimTerms,
   kRayTerms,
+  kCameraRays,
+  kLook,
+  kRaySource,
+  kRaySums,
+  kRaySlopes,
+  kRayGradient,
   kEdges,
   kGradient,
   kCombine,

@@ -139,8 +139,7 @@ Result<SolveSummary> VulkanSolver::solve(const FieldBatch& b,
 Result<std::unique_ptr<Minimiser>> VulkanSolver::begin(const ChannelProblem& problem,
                                                        const InverseOptions& options,
                                                        const LbfgsState& from) {
-  if (options.method != Method::kLbfgs || !problem.rays.empty())
-    return std::unique_ptr<Minimiser>();
+  if (options.method != Method::kLbfgs) return std::unique_ptr<Minimiser>();
   fields_.reset();
   levels_.clear();
   coefficients_.clear();

@@ -29,6 +29,7 @@ struct Case {
   int illuminations;
   double brightness;  // of the light: any unit will do
   Smoothness prior = Smoothness::kH1;
+  bool along_rays = false;
 };
 std::string case_name(const testing::TestParamInfo<Case>& info) { return info.param.name; }
 
@@ -109,7 +110,67 @@ const Case kCases[] = {{"OneCell",
                         Face::kZMin,
                         Face::kZMax,
                         2,
-                        1.0}};
+                        1.0},
+                       {"OneCellAlongRays",
+                        {1, 1, 1, 0.5, 0.5, 0.5},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kZMin,
+                        Face::kZMax,
+                        1,
+                        1.0,
+                        Smoothness::kH1,
+                        true},
+                       {"BackLitAlongRays",
+                        {17, 33, 5, 0.5, 0.4, 0.3},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kZMin,
+                        Face::kZMax,
+                        5,
+                        1.0,
+                        Smoothness::kH1,
+                        true},
+                       {"FrontLitAlongRays",
+                        {9, 12, 8, 0.5, 0.5, 0.5},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kZMax,
+                        Face::kZMax,
+                        4,
+                        1.0,
+                        Smoothness::kH1,
+                        true},
+                       {"FrontLitSurfaceAlongRays",
+                        {6, 5, 14, 0.5, 0.6, 0.9},
+                        kSurfaceLight,
+                        kCentre,
+                        Face::kZMax,
+                        Face::kZMax,
+                        3,
+                        1e9,
+                        Smoothness::kH1,
+                        true},
+                       {"FromTheSideAlongRays",
+                        {7, 6, 5, 0.5, 0.6, 0.4},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kXMax,
+                        Face::kYMin,
+                        9,
+                        1.0,
+                        Smoothness::kH1,
+                        true},
+                       {"RowsAlongRays",
+                        {1, 130, 3, 0.5, 0.5, 0.5},
+                        kCollimatedLight,
+                        kCentroidDeposit,
+                        Face::kZMin,
+                        Face::kZMax,
+                        2,
+                        1.0,
+                        Smoothness::kH1,
+                        true}};
 
 ChannelCoefficients random_coefficients(std::size_t cells, unsigned seed) {
   std::mt19937 random(seed);
@@ -140,6 +201,9 @@ ChannelProblem random_problem(const Case& c) {
       .data_count = 1};
   for (std::size_t x = 0; x < c.block.face_cell_count(c.seen); ++x)
     problem.camera.push_back(diffusion::camera_equation(1.3, problem.boundary, uniform(random)));
+  for (std::size_t x = 0; c.along_rays && x < problem.camera.size(); ++x)
+    problem.rays.push_back(
+        diffusion::camera_ray(1.3, uniform(random) - 0.6, uniform(random) - 0.6));
   for (ChannelIllumination& i : problem.illuminations) {
     for (std::size_t x = 0; x < c.block.face_cell_count(c.lit); ++x)
       i.irradiance.push_back(uniform(random) > 0.5 || x == 0 ? c.brightness * uniform(random)
@@ -271,14 +335,16 @@ TEST_P(DeviceObjectiveTest, AgreesWithTheHostsValueAndGradient) {
 }
 
 /// What the device has left when its memory holds one group of four illuminations and little more.
-gpu::Rehearsal tiny(const Block& block) {
+gpu::Rehearsal tiny(const Block& block, bool along_rays) {
   return {.max_binding_bytes =
               std::max<std::uint64_t>(16 * block.cell_count(), std::uint64_t{2048} * kOwn),
-          .memory_bytes = 480 * block.cell_count() + (1 << 20)};
+          .memory_bytes = (along_rays ? 594 : 480) * block.cell_count() + (1 << 20)};
 }
 
 // The same sums in another order: chi^2 and gradient of the groups are added up one group after another.
-TEST(DeviceObjective, IsTheSameInManySmallBuffersAsInOne) {
+class DeviceObjectiveSplitTest : public testing::TestWithParam<bool> {};
+
+TEST_P(DeviceObjectiveSplitTest, IsTheSameInManySmallBuffersAsInOne) {
   const Case c{"Split",
                {24, 24, 24, 0.5, 0.5, 0.5},
                kCollimatedLight,
@@ -286,13 +352,15 @@ TEST(DeviceObjective, IsTheSameInManySmallBuffersAsInOne) {
                Face::kZMin,
                Face::kZMax,
                18,
-               1.0};
+               1.0,
+               Smoothness::kH1,
+               GetParam()};
   const ChannelProblem problem = random_problem(c);
   const std::vector<double> p = to_parameters(random_coefficients(problem.block.cell_count(), 3));
   std::vector<Evaluation> found;
   const std::uint64_t one_group = 16 * problem.block.cell_count();
   const gpu::Rehearsal binding{.max_binding_bytes = 2 * one_group};
-  for (const gpu::Rehearsal& rehearsal : {gpu::Rehearsal{}, binding, tiny(c.block)}) {
+  for (const gpu::Rehearsal& rehearsal : {gpu::Rehearsal{}, binding, tiny(c.block, GetParam())}) {
     Device device(rehearsal);
     Recorder recorder = device.recorder();
     auto objective = DeviceObjective::create(
@@ -312,6 +380,8 @@ TEST(DeviceObjective, IsTheSameInManySmallBuffersAsInOne) {
     EXPECT_LE(difference(at.gradient, found[0].gradient), 1e-6);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(AtTheSurfaceAndAlongRays, DeviceObjectiveSplitTest, testing::Bool());
 
 TEST(DeviceObjective, SaysWhenTheDeviceIsTooSmall) {
   const ChannelProblem problem = random_problem(kCases[1]);

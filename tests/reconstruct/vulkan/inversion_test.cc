@@ -57,9 +57,16 @@ TEST(InversionOnVulkan, EndsAtTheMaterialThatTheReferenceEndsAt) {
   EXPECT_NEAR(on_gpu->held_out.error, truth->held_out.error, 1e-4);
 }
 
+/// Seen by a camera, aslant, so that the minimisation takes what runs along refracted rays with it.
+Dataset seen_by_a_camera() {
+  Dataset dataset = testing_support::make_synthetic_dataset({{8, 8, 4, 1.0, 1.0, 1.0}, 2});
+  dataset.view_direction = Image<float>(8, 8, 2, 0.3F);
+  return dataset;
+}
+
 class OnTheDevice : public testing::Test {
  protected:
-  const Dataset dataset_ = testing_support::make_synthetic_dataset({{8, 8, 4, 1.0, 1.0, 1.0}, 2});
+  const Dataset dataset_ = seen_by_a_camera();
   const std::unique_ptr<diffusion::FluenceSolver> reference_ = diffusion::make_reference_solver();
   const InverseResult truth_ = *invert(dataset_, *reference_);
 };
