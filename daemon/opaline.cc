@@ -18,6 +18,7 @@
 #include "daemon/cli/render.h"
 #include "daemon/cli/run.h"
 #include "daemon/cli/tradeoff.h"
+#include "daemon/cli/view.h"
 #include "daemon/executor.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/version.h"
@@ -55,6 +56,7 @@ struct Arguments {
   CalibrationPlace calibrations{default_calibrations(), {}};
   std::vector<int> versions;
   RenderWish render;
+  ViewWish view;
 };
 
 int report(const Error& error) {
@@ -321,6 +323,29 @@ void declare_render(CLI::App& app, Arguments& arguments, int& status_code) {
   sub->callback([&] { status_code = report(become_render(arguments.programs, wish)); });
 }
 
+void declare_view(CLI::App& app, Arguments& arguments, int& status_code) {
+  ViewWish& wish = arguments.view;
+  CLI::App* sub = app.add_subcommand(
+      "view", "Open a window on a scene: light it, paint into it, bend it, without a daemon");
+  sub->add_option("SCENE", wish.scene, "scene.toml (docs/rendering.md)")->required();
+  sub->add_option("--do", wish.actions, "Does this, one thing a picture; may be given again");
+  sub->add_option("--frames", wish.frames, "Ends after this many pictures")
+      ->check(CLI::Range(0, 1'000'000));
+  sub->add_option("--screenshot", wish.screenshot, "PNG of the window before it ends");
+  sub->add_option("--width", wish.width, "Of the window, pixels")->check(CLI::Range(64, 8192));
+  sub->add_option("--height", wish.height, "Of the window, pixels")->check(CLI::Range(64, 8192));
+  sub->add_option("--device", wish.device, "Part of the name of the Vulkan device");
+  sub->add_flag("--validation", wish.validation, "Vulkan's validation layer; what it says fails");
+  sub->add_option("--threads", wish.threads, "0: one a processor")->check(CLI::Range(0, 1024));
+  sub->footer(
+      "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
+      "  opaline view config/scene_marble_torus.toml\n"
+      "  opaline view scene.toml --do 'brush radius 2' --do 'paint 0.5 0.6' --do 'screenshot "
+      "a.png'\n"
+      "  opaline view scene.toml --frames 5 --screenshot window.png");
+  sub->callback([&] { status_code = report(become_view(arguments.programs, wish)); });
+}
+
 Error become_calibrate(const Arguments& arguments) {
   const CalibrateWish& wish = arguments.calibrate;
   std::vector<std::string> words{"--calibrations", arguments.calibrations.root.string()};
@@ -429,6 +454,7 @@ void declare(CLI::App& app, Arguments& arguments, int& status_code) {
   declare_calibrate(app, arguments, status_code);
   declare_calibration(app, arguments, status_code);
   declare_render(app, arguments, status_code);
+  declare_view(app, arguments, status_code);
 }
 
 int program(int argc, char** argv) {

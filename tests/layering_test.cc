@@ -64,7 +64,10 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 const std::map<std::string, std::vector<std::string>> kOnlyUsers{
     {"openvdb/", {"base/io", "tests/base/io"}},
     {"OpenImageIO/", {"base/io"}},
-    {"vulkan/", {"gpu"}},
+    {"vulkan/", {"gpu", "daemon/view"}},
+    {"GLFW/", {"daemon/view"}},
+    {"imgui.h", {"daemon/view"}},
+    {"backends/imgui", {"daemon/view"}},
     {"boost/", {"daemon", "sim"}},
     {"sqlite3.h", {"daemon"}},
     {"toml++/", {"config", "drivers"}},

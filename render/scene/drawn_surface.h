@@ -21,6 +21,14 @@ class DrawnSurface {
   /// Moves the surface from where it was at rest; its normals turn with it.
   void bend(const Deformation& deformation);
 
+  /// Where a vertex is when nothing is bent, and its normal there.
+  Vec3 rest_place(int vertex) const {
+    return rest_.empty() ? mesh_.vertices[vertex] : rest_[vertex];
+  }
+  Vec3 rest_normal(int vertex) const {
+    return rest_normals_.empty() ? normals_[vertex] : rest_normals_[vertex];
+  }
+
   const TriangleMesh& mesh() const { return mesh_; }
   /// Of each vertex: of the signed distance, else of the triangles around it.
   const std::vector<Vec3>& normals() const { return normals_; }

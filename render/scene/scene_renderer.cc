@@ -175,6 +175,11 @@ std::vector<SceneRenderer::DrawnObject> SceneRenderer::drawn() const {
   return objects;
 }
 
+void SceneRenderer::set_tolerance(double tolerance) {
+  scene_.diffusion.tolerance = tolerance;
+  for (Body& body : bodies_) body.body->subsurface().set_tolerance(tolerance);
+}
+
 TranslucentBody* SceneRenderer::body(std::size_t object) {
   for (Body& body : bodies_) {
     if (body.object == static_cast<int>(object)) return body.body.get();

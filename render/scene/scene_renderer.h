@@ -67,6 +67,10 @@ class SceneRenderer {
   /// Bends an object from its rest, translucent or opaque; answers how many tetrahedra are turned inside out (see
   /// TranslucentBody::bend()). Shadows and the environment's visibility follow. Call light() afterwards.
   Result<std::size_t> bend(std::size_t object, const DeformOptions& options, std::stop_token stop);
+  /// The nearest surface on a ray.
+  std::optional<Surfaces::Hit> pick(const Ray& ray) const { return surfaces_.nearest(ray); }
+  /// Of the relative residual, from the next lighting on.
+  void set_tolerance(double tolerance);
   /// Linear radiance and coverage, as Painter says. Call light() first.
   Result<Image<float>> draw(const CameraModel& camera, std::stop_token stop);
 

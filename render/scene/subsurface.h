@@ -56,6 +56,8 @@ class Subsurface {
                                                     std::stop_token stop);
   virtual ~Subsurface() = default;
 
+  /// Of the next solutions: the dial between speed and accuracy.
+  void set_tolerance(double tolerance) { options_.tolerance = tolerance; }
   /// Takes the coefficients anew; the next solution starts from the last. Errors: see validate(optics).
   Result<void> set_material(const MaterialAt& material);
   /// Bends the solid as it was at rest; its graph stays. Answers how many tetrahedra that would turn inside out: where

@@ -72,6 +72,14 @@ Box TranslucentBody::own_box(double margin) const {
   return {box.low - more, box.high + more};
 }
 
+Vec3 TranslucentBody::own_place(int vertex) const {
+  return scene_from_own_.inverse().apply(drawn_->rest_place(vertex));
+}
+
+Vec3 TranslucentBody::own_normal(int vertex) const {
+  return scene_from_own_.inverse().rotate(drawn_->rest_normal(vertex));
+}
+
 Result<void> TranslucentBody::begin_editing() {
   if (editor_) return ok();
   std::shared_ptr<Material> block = material_->block();

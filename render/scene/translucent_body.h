@@ -38,6 +38,10 @@ class TranslucentBody {
   const std::vector<std::string>& notes() const { return notes_; }
   double load_seconds() const { return load_seconds_; }
 
+  /// Of a drawn vertex, in the object's own frame, at rest: what EditOptions are told in.
+  Vec3 own_place(int vertex) const;
+  Vec3 own_normal(int vertex) const;
+
   /// One stroke, several, or none; the next lighting has it. Answers how many cells changed. Errors: those of MaterialEditor
   /// and Subsurface::set_material().
   Result<std::size_t> edit(const std::vector<EditOptions>& strokes);
