@@ -4,7 +4,8 @@
 // against the bound 1 / sum t^2 / var(light - black) over the exposures that do not clip; capture.time_ratio_vs_fixed_bracket,
 // the time that exposures of 1/30 to 8 s take, each four times (sim_one_stop: twice) the one before, over that of planned ones
 // with the same goal, black frames included, the worse of marble and wax in the demo's station; and
-// capture.time_over_photon_limit, of the planned ones without black frames over what photon noise alone asks for.
+// capture.time_over_photon_limit, of the planned ones without black frames over what photon noise alone asks for; and colour.de2000_mean, _p95 and _max, CIEDE2000 of the patches of a
+// ColorChecker by corrections that did not know them, at three exposures: root polynomials (sim) and a matrix (sim_matrix).
 //
 //   calibration
 
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "bench/calibrate/capture_time.h"
+#include "bench/calibrate/chart_colors.h"
 #include "bench/figure.h"
 #include "calibration/response_fit.h"
 #include "capture/hdr_merge.h"
@@ -161,6 +163,21 @@ bool print_capture_time() {
   return true;
 }
 
+bool print_colors() {
+  const auto colors = chart_colors();
+  if (!colors) {
+    fmt::print(stderr, "calibration: {}\n", colors.error().message);
+    return false;
+  }
+  for (const auto& [name, error] :
+       {std::pair{"sim", colors->root_polynomial}, std::pair{"sim_matrix", colors->matrix}}) {
+    print_figure("colour.de2000_mean", name, error.mean, "1");
+    print_figure("colour.de2000_p95", name, error.p95, "1");
+    print_figure("colour.de2000_max", name, error.most, "1");
+  }
+  return true;
+}
+
 int run() {
   double worst = 0.0;
   for (const int bits : {8, 12, 16}) {
@@ -186,7 +203,7 @@ int run() {
   }
   print_figure("hdr.bias", "sim", most.bias, "1");
   print_figure("hdr.variance_over_crb", "sim", most.over_bound, "1");
-  return print_capture_time() ? 0 : 1;
+  return print_colors() && print_capture_time() ? 0 : 1;
 }
 
 }  // namespace

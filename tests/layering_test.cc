@@ -72,7 +72,7 @@ const std::map<std::string, std::vector<std::string>> kOnlyUsers{
     {"sqlite3.h", {"daemon"}},
     {"toml++/", {"config", "drivers"}},
     {"spdlog/", {"base"}},
-    {"Eigen/", {"reconstruct", "calibration", "tests", "bench"}},
+    {"Eigen/", {"reconstruct", "calibration", "sim", "tests", "bench"}},
     {"opencv2/", {"calibration"}},
     {"ceres/", {"calibration"}},
     {"hwy/", {"reconstruct", "sim"}},
