@@ -57,7 +57,8 @@ class HdrMerge {
     bool saturated = false;
   };
   struct Term {  // frames of one exposure, less the black frame that they share: their means
-    double weight, seconds, black_seconds, net, per_code, black_per_code;
+    double weight = 0.0, seconds = 0.0, black_seconds = 0.0;
+    double net = 0.0, per_code = 0.0, black_per_code = 0.0;
     double frames = 1.0;
     double blacks = 1.0;
     const Image<std::uint16_t>* black = nullptr;

@@ -3,6 +3,7 @@
 option(OPALINE_TESTS "Build the tests" ON)
 option(OPALINE_BENCH "Build the benchmarks" OFF)
 option(OPALINE_WERROR "A warning stops the build" OFF)
+option(OPALINE_UNITY "Compile several sources of a library as one: quicker, and needs Python" OFF)
 set(OPALINE_SANITIZE "" CACHE STRING "Sanitizers, for instance address,undefined or thread")
 
 set(CMAKE_CXX_STANDARD 20)
@@ -31,12 +32,32 @@ if(OPALINE_SANITIZE)
   target_link_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE})
 endif()
 
+# Sources that share no name of their own are compiled together: scripts/source_groups.py.
+function(opaline_unite target)
+  file(RELATIVE_PATH here ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  list(TRANSFORM ARGN PREPEND ${here}/ OUTPUT_VARIABLE sources)
+  execute_process(COMMAND python3 ${CMAKE_SOURCE_DIR}/scripts/source_groups.py ${sources}
+    OUTPUT_VARIABLE lines COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE "\n" ";" lines "${lines}")
+  set(number 0)
+  foreach(line ${lines})
+    string(REPLACE " " ";" group "${line}")
+    list(TRANSFORM group PREPEND ${CMAKE_SOURCE_DIR}/)
+    math(EXPR number "${number} + 1")
+    set_source_files_properties(${group} PROPERTIES UNITY_GROUP group${number})
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+endfunction()
+
 # opaline_library(NAME SOURCES a.cc ... USES lower_library ... LINK third::party ...)
 # USES is the layer; tests/layering_test.cc holds it, and every #include, against the table of docs/architecture.md.
 # LINK is private to the library; a third party that a header shows goes under PUBLIC_LINK.
 function(opaline_library name)
   cmake_parse_arguments(A "" "" "SOURCES;USES;LINK;PUBLIC_LINK" ${ARGN})
   add_library(opaline_${name} STATIC ${A_SOURCES})
+  if(OPALINE_UNITY)
+    opaline_unite(opaline_${name} ${A_SOURCES})
+  endif()
   list(TRANSFORM A_USES PREPEND opaline_)
   target_link_libraries(opaline_${name} PUBLIC opaline_options ${A_USES} ${A_PUBLIC_LINK} Threads::Threads
     PRIVATE ${A_LINK})

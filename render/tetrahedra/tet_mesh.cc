@@ -10,23 +10,23 @@
 namespace opaline::render {
 namespace {
 
-struct Side {
+struct FaceSide {
   std::array<int, 3> corners{};  // sorted
   int tet = 0;
   int opposite = 0;
 };
 
-std::vector<Side> sorted_sides(const TetMesh& mesh) {
-  std::vector<Side> sides;
+std::vector<FaceSide> sorted_sides(const TetMesh& mesh) {
+  std::vector<FaceSide> sides;
   sides.reserve(4 * mesh.tets.size());
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
     for (int k = 0; k < 4; ++k) {
-      Side side{face_of(mesh.tets[t], k), static_cast<int>(t), k};
+      FaceSide side{face_of(mesh.tets[t], k), static_cast<int>(t), k};
       std::ranges::sort(side.corners);
       sides.push_back(side);
     }
   }
-  std::ranges::sort(sides, {}, &Side::corners);
+  std::ranges::sort(sides, {}, &FaceSide::corners);
   return sides;
 }
 
@@ -89,7 +89,7 @@ Result<void> validate(const TetMesh& mesh) {
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
     if (auto checked = check_tet(mesh, t); !checked) return checked.error();
   }
-  const std::vector<Side> sides = sorted_sides(mesh);
+  const std::vector<FaceSide> sides = sorted_sides(mesh);
   for (std::size_t i = 2; i < sides.size(); ++i) {
     if (sides[i].corners == sides[i - 2].corners) {
       return invalid_argument(
@@ -101,7 +101,7 @@ Result<void> validate(const TetMesh& mesh) {
 
 std::vector<std::array<int, 4>> neighbours_of(const TetMesh& mesh) {
   std::vector<std::array<int, 4>> neighbours(mesh.tets.size(), {-1, -1, -1, -1});
-  const std::vector<Side> sides = sorted_sides(mesh);
+  const std::vector<FaceSide> sides = sorted_sides(mesh);
   for (std::size_t i = 1; i < sides.size(); ++i) {
     if (sides[i].corners != sides[i - 1].corners) continue;
     neighbours[sides[i].tet][sides[i].opposite] = sides[i - 1].tet;
