@@ -30,7 +30,8 @@ struct Board {
   int rows() const { return squares_y - 1; }
   int corner_count() const { return columns() * rows(); }
   Vec3 corner(int id) const {
-    return {(id % columns() + 1) * square_mm, (id / columns() + 1) * square_mm, 0.0};
+    const int row = id / columns();
+    return {(id % columns() + 1) * square_mm, (row + 1) * square_mm, 0.0};
   }
 };
 

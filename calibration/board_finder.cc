@@ -131,7 +131,9 @@ std::optional<Edge> edge_between(const cv::Mat& picture,
   double second = 0.0;
   const double mx = 0.5 * (a.x + b.x);
   const double my = 0.5 * (a.y + b.y);
-  for (double s = -reach; s < reach; s += kProfileStep) {
+  const int steps = static_cast<int>(std::ceil(2.0 * reach / kProfileStep));
+  for (int n = 0; n < steps; ++n) {
+    const double s = n * kProfileStep - reach;
     const double from = sample(picture, mx + s * nx, my + s * ny);
     const double to = sample(picture, mx + (s + kProfileStep) * nx, my + (s + kProfileStep) * ny);
     const double place = s + 0.5 * kProfileStep;

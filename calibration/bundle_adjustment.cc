@@ -17,7 +17,7 @@ using PoseBlock = std::array<double, 6>;  // angle axis, then translation
 
 template <class T>
 void move(const T* pose, std::array<T, 3>& p) {
-  std::array<T, 3> turned;
+  std::array<T, 3> turned{};
   ceres::AngleAxisRotatePoint(pose, p.data(), turned.data());
   for (std::size_t i = 0; i < 3; ++i) p[i] = turned[i] + pose[3 + i];
 }
@@ -37,7 +37,7 @@ void look(const T* lens, const std::array<T, 3>& p, T* pixel) {
 
 struct Misses {
   Sighting seen;
-  double sigma;
+  double sigma = 1.0;
 
   template <class T>
   bool fill(const T* lens, const std::array<T, 3>& p, T* residual) const {
@@ -231,6 +231,7 @@ Result<void> fill_deviations(ceres::Problem& problem,
   for (const LensBlock& lens : blocks.lenses) wanted.push_back(lens.data());
   if (blocks.places.size() > 1) wanted.push_back(blocks.places[1].data());
   std::vector<std::pair<const double*, const double*>> pairs;
+  pairs.reserve(wanted.size());
   for (const double* block : wanted) pairs.emplace_back(block, block);
   if (!covariance.Compute(pairs, &problem))
     return invalid_argument(

@@ -165,13 +165,13 @@ Result<std::optional<FoundChart>> find_chart(const Image<std::uint16_t>& picture
     if (!corners) return std::optional<FoundChart>();
     // The long side is that of six patches.
     if (side(*corners, 0, 1) + side(*corners, 2, 3) < side(*corners, 1, 2) + side(*corners, 3, 0))
-      std::ranges::rotate(*corners, corners->begin() + 1);
+      std::rotate(corners->begin(), corners->begin() + 1, corners->end());
     FoundChart upright = measured(picture, *corners, black, clipping);
-    std::ranges::rotate(*corners, corners->begin() + 2);
+    std::rotate(corners->begin(), corners->begin() + 2, corners->end());
     FoundChart turned = measured(picture, *corners, black, clipping);
     FoundChart& best = misfit(upright) <= misfit(turned) ? upright : turned;
     if (best.smallest_px < kFewestPixels) return std::optional<FoundChart>();
-    return std::optional(std::move(best));
+    return std::optional(best);
   } catch (const cv::Exception& e) {
     return internal_error(std::string("colour chart: ") + e.what());
   }

@@ -114,6 +114,7 @@ std::vector<double> typical_rms(const Kept& kept, const BundleSummary& summary, 
       distances[static_cast<std::size_t>(s.view)].push_back(summary.distance_px[i]);
   }
   std::vector<double> rms;
+  rms.reserve(distances.size());
   for (std::vector<double>& view : distances)
     rms.push_back(std::numbers::sqrt2 / kMedianOfRayleigh * median_of(std::move(view)));
   return rms;

@@ -27,6 +27,7 @@ Pose middle_place(const std::vector<Pose>& places) {
   Pose found;
   for (const Pose& candidate : places) {
     std::vector<double> away;
+    away.reserve(places.size());
     for (const Pose& other : places) {
       away.push_back(length(candidate.translation - other.translation) +
                      length(candidate.translation) * length(turn_of(candidate) - turn_of(other)));

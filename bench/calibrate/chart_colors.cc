@@ -43,6 +43,7 @@ Result<ChartColors> chart_colors() {
     exposures.push_back(*std::move(patches));
   }
   std::vector<calibration::Lab> references;
+  references.reserve(kColorChecker.size());
   for (const ColorCheckerPatch& patch : kColorChecker) references.push_back(patch.lab);
   const auto balance = calibration::balance_white(exposures.back()[18]);
   if (!balance) return balance.error();
