@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <utility>
@@ -13,7 +14,12 @@ namespace opaline::calibration {
 namespace {
 
 using Step = Result<StepRecord> (*)(StepContext&);
-constexpr std::array<Step, kSteps.size()> kDo{warm_up, black_level, linearity, radiometric, check};
+constexpr std::array<Step, kSteps.size() + kExtraSteps.size()> kDo{
+    warm_up, black_level, linearity, radiometric, check, color};
+
+std::string_view name_of_step(std::size_t step) {
+  return step < kSteps.size() ? kSteps[step] : kExtraSteps[step - kSteps.size()];
+}
 
 DeviceIdentity identity_of(const drivers::CameraInfo& camera) {
   return {camera.model, camera.serial, camera.width, camera.height, camera.bit_depth};
@@ -51,12 +57,12 @@ bool accepted_before(const Record& record, std::size_t step) {
 }
 
 Result<void> check_order(const Record& record, std::size_t wanted) {
-  for (std::size_t i = 1; i < wanted; ++i) {
+  for (std::size_t i = 1; i < std::min(wanted, kSteps.size()); ++i) {
     if (accepted_before(record, i)) continue;
     return invalid_argument(
         fmt::format("step {} needs {}, which has not been accepted: do that first, with "
                     "\"--step {}\", or all with \"--resume\"",
-                    kSteps[wanted],
+                    name_of_step(wanted),
                     kSteps[i],
                     kSteps[i]));
   }
@@ -73,6 +79,7 @@ Result<void> note(EventSink& events, const StepRecord& step) {
 
 bool is_due(const Record& record, std::size_t step, const std::optional<std::size_t>& only) {
   if (step == 0) return true;
+  if (step >= kSteps.size()) return only && step == *only;
   return only ? step == *only : !accepted_before(record, step);
 }
 
@@ -109,11 +116,11 @@ Result<void> run_procedure(Record& record,
   if (!taker) return taker.error();
   if (auto same = same_devices(record, **taker); !same) return same;
   StepContext context{**taker, given, record, events, stop};
-  for (std::size_t i = 0; i < kSteps.size(); ++i) {
+  for (std::size_t i = 0; i < kDo.size(); ++i) {
     if (!is_due(record, i, only)) continue;
-    context.step = kSteps[i];
+    context.step = name_of_step(i);
     auto done = kDo[i](context);
-    if (!done) return done.error().in(kSteps[i]);
+    if (!done) return done.error().in(std::string(name_of_step(i)));
     done->finished = utc_now();
     const bool accepted = done->accepted();
     if (auto noted = note(events, *done); !noted) return noted;

@@ -73,6 +73,11 @@ ordered_json to_json(const Measured& m) {
   put("projector_gamma", m.projector_gamma);
   put("gain_electrons_per_code", m.gain_electrons_per_code);
   put("read_noise_electrons", m.read_noise_electrons);
+  if (m.color) {
+    out["color"] = {{"model", to_string(m.color->model)},
+                    {"white_balance", m.color->white_balance},
+                    {"coefficients", m.color->coefficients}};
+  }
   for (const capture::ExposureFactor& f : m.exposure_factors)
     out["exposure_factors"].push_back({{"reported_s", f.reported_s}, {"factor", f.factor}});
   return out;
@@ -113,6 +118,15 @@ capture::ResponseCurve response_from(const json& in) {
   return response;
 }
 
+ColorCorrection color_from(const json& in) {
+  ColorCorrection color;
+  const bool matrix = in.at("model").get<std::string>() == to_string(ColorModel::kMatrix);
+  color.model = matrix ? ColorModel::kMatrix : ColorModel::kRootPolynomial;
+  color.white_balance = in.at("white_balance").get<CameraRgb>();
+  color.coefficients = in.at("coefficients").get<std::vector<double>>();
+  return color;
+}
+
 Measured measured_from(const json& in) {
   const auto number = [&](const char* key) {
     const auto found = in.find(key);
@@ -130,6 +144,7 @@ Measured measured_from(const json& in) {
   m.projector_gamma = number("projector_gamma");
   m.gain_electrons_per_code = number("gain_electrons_per_code");
   m.read_noise_electrons = number("read_noise_electrons");
+  if (in.contains("color")) m.color = color_from(in.at("color"));
   for (const json& f : in.value("exposure_factors", json::array()))
     m.exposure_factors.push_back({f.at("reported_s").get<double>(), f.at("factor").get<double>()});
   return m;
@@ -140,8 +155,13 @@ Measured measured_from(const json& in) {
 Result<std::size_t> step_index(std::string_view name) {
   const auto* const found = std::ranges::find(kSteps, name);
   if (found != kSteps.end()) return static_cast<std::size_t>(found - kSteps.begin());
-  return invalid_argument(
-      fmt::format("no step \"{}\"; there are {}", name, fmt::join(kSteps, ", ")));
+  const auto* const extra = std::ranges::find(kExtraSteps, name);
+  if (extra != kExtraSteps.end())
+    return kSteps.size() + static_cast<std::size_t>(extra - kExtraSteps.begin());
+  return invalid_argument(fmt::format("no step \"{}\"; there are {} and {}",
+                                      name,
+                                      fmt::join(kSteps, ", "),
+                                      fmt::join(kExtraSteps, ", ")));
 }
 
 bool StepRecord::accepted() const { return std::ranges::all_of(gates, &Gate::passed); }
@@ -175,7 +195,9 @@ void Record::put(StepRecord step) {
 
 RecordState Record::state() const {
   if (!std::ranges::all_of(steps, &StepRecord::accepted)) return RecordState::kRefused;
-  return steps.size() == kSteps.size() ? RecordState::kAccepted : RecordState::kIncomplete;
+  const bool all =
+      std::ranges::all_of(kSteps, [this](std::string_view step) { return find(step) != nullptr; });
+  return all ? RecordState::kAccepted : RecordState::kIncomplete;
 }
 
 double Record::margin() const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "calibration/color_fit.h"
 #include "capture/calibration.h"
 
 namespace opaline::calibration {
@@ -15,7 +16,9 @@ namespace opaline::calibration {
 /// The steps in the order that they must be done: each believes what those before it found.
 inline constexpr std::array<std::string_view, 5> kSteps{
     "warm_up", "black_level", "linearity", "radiometric", "check"};
-/// Place of a step in kSteps. Errors: kInvalidArgument listing them.
+/// Steps that are done when asked for, once all of kSteps are accepted: sessions do without.
+inline constexpr std::array<std::string_view, 1> kExtraSteps{"colour"};
+/// Place of a step in kSteps, kExtraSteps behind them. Errors: kInvalidArgument listing them.
 Result<std::size_t> step_index(std::string_view name);
 
 /// One figure that a step must keep to be accepted: value <= limit.
@@ -60,6 +63,7 @@ struct Measured {
   std::optional<double> projector_gamma;
   std::optional<double> gain_electrons_per_code;
   std::optional<double> read_noise_electrons;
+  std::optional<ColorCorrection> color;                   ///< of light above black, in any unit
   std::vector<capture::ExposureFactor> exposure_factors;  ///< empty: the camera reports them right
 };
 
@@ -77,7 +81,7 @@ struct Record {
   std::string program;  ///< what made it
   DeviceIdentity camera;
   DeviceIdentity projector;
-  std::vector<StepRecord> steps;  ///< in order; the first ones of kSteps
+  std::vector<StepRecord> steps;  ///< in order; the first ones of kSteps, then extra ones
   Measured measured;
 
   const StepRecord* find(std::string_view step) const;

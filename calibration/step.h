@@ -33,6 +33,7 @@ Result<StepRecord> black_level(StepContext& context);
 Result<StepRecord> linearity(StepContext& context);
 Result<StepRecord> radiometric(StepContext& context);
 Result<StepRecord> check(StepContext& context);
+Result<StepRecord> color(StepContext& context);
 
 /// The camera as far as it has been measured, with codes for electrons: electrons_from_code() gives codes of a linear sensor.
 capture::CameraCalibration linear_camera(const StepContext& context);

@@ -178,6 +178,7 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
   fields.number({"time_factor", "how many times as fast as real time its clock runs"},
                 sim.rig.time_factor,
                 Range::between(1, 1000));
+  fields.flag({"chart", "a ColorChecker lies before the camera instead of the sample"}, sim.chart);
   fields.table({"scene", "The sample."}, [&](Fields& f) { visit_scene(f, sim.scene); });
   fields.table({"camera", "What its camera does to the light."},
                [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });

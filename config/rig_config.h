@@ -46,6 +46,7 @@ struct SimConfig {
   sim::ResponseOptions transport;   ///< its camera_centre follows from the camera's pose
   std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
   std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
+  bool chart = false;               ///< a ColorChecker lies before the camera instead of the sample
   sim::LedSphereOptions balls;      ///< what a simulated light stage looks at
   std::vector<SphereLight>
       lights;  ///< of that stage, as believed; none: the station has a projector

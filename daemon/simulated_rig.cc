@@ -24,6 +24,7 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include "base/sha256.h"
 #include "config/session_config.h"
 #include "daemon/jobs/version.h"
+#include "sim/color_chart.h"
 #include "sim/led_sphere.h"
 #include "sim/rig_client.h"
 #include "sim/rig_message.h"
@@ -168,6 +169,13 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
     if (!balls) return balls.error();
     return sim::Rig::create(
         options, std::shared_ptr<const sim::LightPath>(*std::move(balls)), clock);
+  }
+  if (sim.chart) {
+    return sim::Rig::create(
+        options,
+        std::make_shared<const sim::ChartOptics>(
+            options.camera, options.projector, sim::chart_before(options.camera)),
+        clock);
   }
   auto responses = sim::load_or_compute(
       sim.scene, sim.transport, {sim.responses, sim.cache}, events, std::move(stop));

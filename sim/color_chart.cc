@@ -176,6 +176,20 @@ Spectrum smooth_reflectance(const std::array<double, 3>& lab) {
   return spectrum;
 }
 
+ChartOptions chart_before(const CameraOptics& camera) {
+  constexpr std::array<std::array<double, 2>, 4> kPlaces{
+      {{-0.33, -0.27},
+       {0.34, -0.23},
+       {0.32, 0.22},
+       {-0.31, 0.18}}};  // of the width, from the middle
+  ChartOptions chart;
+  for (std::size_t i = 0; i < kPlaces.size(); ++i) {
+    chart.corners[i] = {0.5 * camera.model.width + kPlaces[i][0] * camera.model.width,
+                        0.5 * camera.model.height + kPlaces[i][1] * camera.model.width};
+  }
+  return chart;
+}
+
 ChartOptics::ChartOptics(const CameraOptics& camera,
                          const ProjectorOptics& projector,
                          const ChartOptions& options)

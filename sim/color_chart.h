@@ -31,6 +31,9 @@ struct ChartOptions {
   double wall = 0.2;          ///< of what is behind
 };
 
+/// A chart that lies a little askew in the middle of the picture, over half of its width.
+ChartOptions chart_before(const CameraOptics& camera);
+
 /// What a camera sees of a chart that a projector lights evenly: its spectra through the projector's red, green and blue filters
 /// before a lamp of 6500 K, and through the camera's filters, which are none of the eye's (Gaussians about 600, 535 and 455 nm). A perfect
 /// white under the projector's white has the radiance peak / pi in each channel. Codes are taken as their mean over the picture.

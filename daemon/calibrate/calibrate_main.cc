@@ -209,7 +209,9 @@ Result<void> run(const Arguments& arguments) {
 int program(int argc, char** argv) {
   CLI::App app(
       "Calibrates a station's camera and projector: warm_up, black_level, linearity, radiometric, "
-      "check.\nEach step has gates; the first that fails ends it, and names what to mend.");
+      "check; and colour, when asked for with a ColorChecker before the camera.\nEach step has "
+      "gates; the first "
+      "that fails ends it, and names what to mend.");
   Arguments arguments;
   app.add_option("RIG", arguments.rig, "rig.toml")->required();
   app.add_option("--step", arguments.step, "One step only, after those before it");
@@ -222,7 +224,8 @@ int program(int argc, char** argv) {
       "failed, 2 bad input, 3 stopped, 4 station busy\n\nExamples:\n"
       "  opaline-calibrate config/sim-rig.toml\n"
       "  opaline-calibrate --resume config/sim-rig.toml\n"
-      "  opaline-calibrate --step black_level config/sim-rig.toml");
+      "  opaline-calibrate --step black_level config/sim-rig.toml\n"
+      "  opaline-calibrate --step colour config/sim-rig-chart.toml");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -44,6 +44,7 @@ class SessionConfigTest : public ::testing::Test {
 TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
   for (const char* name : {"sim.toml",
                            "sim-rig.toml",
+                           "sim-rig-chart.toml",
                            "sim_front_lit.toml",
                            "sim-rig-front-lit.toml",
                            "led_sphere.toml",
