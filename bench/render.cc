@@ -193,6 +193,7 @@ void measure_raster() {
   const bench::RasterFrame frame = bench::raster_frame();
   bench::print_figure("render.frame_triangles", "100k", static_cast<double>(frame.triangles), "1");
   bench::print_figure("render.frame_ms", "100k", frame.whole_ms, "ms");
+  bench::print_figure("render.frame_cpu_ms", "100k", frame.whole_cpu_ms, "ms");
   bench::print_figure("render.frame_take_ms", "100k", frame.take_ms, "ms");
   bench::print_figure("render.frame_draw_ms", "100k", frame.draw_ms, "ms");
 }

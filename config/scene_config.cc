@@ -138,7 +138,10 @@ void visit_light(Fields& fields, LightOptions& l) {
 void visit_shape(Fields& fields, ShapeOptions& s, bool is_opaque) {
   fields.text({"shape", "sphere | torus | genus3 | knot | figurine | sheet | plane (opaque only)"},
               s.name);
-  fields.path({"file", "in its place: .obj .off .ply .stl, or .vdb with a level set"}, s.file);
+  fields.path(
+      {"file",
+       "in its place: .obj .off .ply .stl, .vdb with a level set, .mesh .msh .vtk with tetrahedra"},
+      s.file);
   fields.quantity({"size", "largest extent; 0 mm: as the file has it"},
                   s.size_mm,
                   Unit::kLength,

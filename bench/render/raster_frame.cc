@@ -47,6 +47,7 @@ RasterFrame raster_frame() {
   std::vector<double> whole;
   std::vector<double> taking;
   std::vector<double> drawing;
+  std::vector<double> cpu;
   for (int f = 0; f <= kRasterFrames; ++f) {
     scene.lights[0].direction = {std::cos(0.05 * f), std::sin(0.05 * f), -0.9};
     scene.camera.position = {40.0 * std::cos(0.03 * f), 40.0 * std::sin(0.03 * f), 32.0};
@@ -56,12 +57,18 @@ RasterFrame raster_frame() {
     const double taken = watch.seconds();
     static_cast<void>(expect(raster->draw(camera_of(scene.camera, scene.picture), 1, {})));
     const double seconds = watch.seconds();
+    const double busy = watch.cpu();
     if (f == 0) continue;  // the first pays for compilation
     whole.push_back(1e3 * seconds);
+    cpu.push_back(1e3 * busy);
     taking.push_back(1e3 * taken);
     drawing.push_back(1e3 * (seconds - taken));
   }
-  return {median(taking), median(drawing), median(whole), lit->statistics().objects[0].triangles};
+  return {median(taking),
+          median(drawing),
+          median(whole),
+          median(cpu),
+          lit->statistics().objects[0].triangles};
 }
 
 }  // namespace opaline::bench

@@ -20,10 +20,11 @@ using Colour = std::array<double, 3>;
 /// A shape and where it stands: p = position + R_z R_y R_x p_shape, R_x about x first.
 struct ShapeOptions {
   std::string name;  ///< one of shape_names(), or "plane" for an opaque object; empty: the file's
-  std::filesystem::path file;  ///< .obj .off .ply .stl, or .vdb with a level set
-  double unit_mm = 1.0;        ///< length of the file's unit
-  double size_mm = 0.0;        ///< largest extent; 0: a file's own
-  bool centred = false;        ///< whether the file's bounding box is moved to the origin first
+  std::filesystem::path
+      file;  ///< .obj .off .ply .stl; .vdb with a level set; .mesh .msh .vtk with tetrahedra
+  double unit_mm = 1.0;  ///< length of the file's unit
+  double size_mm = 0.0;  ///< largest extent; 0: a file's own
+  bool centred = false;  ///< whether the file's bounding box is moved to the origin first
   Vec3 position;
   std::array<double, 3> rotation_degrees{};  ///< about x, y, z
 };

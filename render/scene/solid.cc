@@ -9,6 +9,7 @@
 #include "render/mesh/read_mesh.h"
 #include "render/mesh/shapes.h"
 #include "render/mesh/turn.h"
+#include "render/tetrahedra/read_tets.h"
 #include "render/tetrahedra/stuffing.h"
 
 namespace opaline::render {
@@ -25,17 +26,32 @@ Result<TriangleMesh> read_surface(const std::filesystem::path& file) {
   return TriangleMesh{std::move(surface->vertices), std::move(surface->triangles)};
 }
 
-Result<TriangleMesh> placed_surface(const ShapeOptions& shape) {
-  auto mesh = read_surface(shape.file);
-  if (!mesh) return mesh.error();
-  const Box box = bounds(*mesh);
+/// Moves a file's vertices to where the shape stands.
+Result<void> place(std::vector<Vec3>& vertices, const ShapeOptions& shape) {
+  const Box box = bounds({vertices, {}});
   const double extent = longest(box.size());
-  if (!(extent > 0.0))
+  if (!(extent > 0.0)) {
     return invalid_argument("all of its corners are one").in(shape.file.string());
+  }
   const double scale = shape.size_mm > 0.0 ? shape.size_mm / extent : shape.unit_mm;
   const Vec3 origin = shape.centred ? box.centre() : Vec3{};
   const Pose pose = scene_from_shape(shape);
-  for (Vec3& p : mesh->vertices) p = pose.apply((p - origin) * scale);
+  for (Vec3& p : vertices) p = pose.apply((p - origin) * scale);
+  return ok();
+}
+
+/// The file's triangles, or the surface of its tetrahedra, which `tets` gets.
+Result<TriangleMesh> placed_surface(const ShapeOptions& shape, std::optional<TetMesh>& tets) {
+  if (is_tet_file(shape.file)) {
+    auto read = read_tets(shape.file);
+    if (!read) return read.error();
+    if (auto placed = place(read->vertices, shape); !placed) return placed.error();
+    tets = *std::move(read);
+    return surface_mesh(*tets);
+  }
+  auto mesh = read_surface(shape.file);
+  if (!mesh) return mesh.error();
+  if (auto placed = place(mesh->vertices, shape); !placed) return placed.error();
   return mesh;
 }
 
@@ -90,7 +106,7 @@ Result<LoadedShape> load_shape(const ShapeOptions& shape) {
     loaded.solid = std::make_unique<PlacedSolid>(*std::move(solid), scene_from_shape(shape));
     return loaded;
   }
-  auto surface = placed_surface(shape);
+  auto surface = placed_surface(shape, loaded.tets);
   if (!surface) return surface.error();
   auto solid = MeshDistance::create(*surface);
   if (!solid) return solid.error().in(shape.file.string());

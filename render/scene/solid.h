@@ -8,6 +8,7 @@
 
 #include "render/mesh/signed_distance.h"
 #include "render/scene/scene.h"
+#include "render/tetrahedra/tet_mesh.h"
 
 namespace opaline::render {
 
@@ -31,6 +32,7 @@ class PlacedSolid final : public SignedDistance {
 struct LoadedShape {
   std::unique_ptr<SignedDistance> solid;
   std::optional<TriangleMesh> surface;
+  std::optional<TetMesh> tets;     ///< where the file has them
   std::vector<std::string> notes;  ///< what a user should know of the file: holes, turned triangles
 };
 

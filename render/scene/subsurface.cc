@@ -52,13 +52,19 @@ Result<TetMesh> cut(const SignedDistance& solid,
       solid, {.spacing_mm = report.spacing_mm, .interior_growth = options.interior_growth}, stop);
   if (!stuffed) return stuffed.error();
   TetMesh mesh = pack(*stuffed);
+  report.mesh_seconds = seconds_since(start);
+  return mesh;
+}
+
+void take_quality(const TetMesh& mesh, Subsurface::Report& report) {
   const TetQuality quality = quality_of(mesh);
   report.tetrahedra = quality.tets;
   report.volume_mm3 = quality.volume;
   report.smallest_dihedral = quality.smallest_dihedral;
   report.components = quality.components;
-  report.mesh_seconds = seconds_since(start);
-  return mesh;
+  if (!(report.spacing_mm > 0.0)) {
+    report.spacing_mm = spacing_for(quality.volume, static_cast<double>(quality.tets));
+  }
 }
 
 Result<std::unique_ptr<Subsurface>> set_up(TetMesh mesh,
@@ -110,14 +116,31 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(const SignedDistance& sol
                                                        const DiffusionOptions& options,
                                                        ThreadTeam& team,
                                                        std::stop_token stop) {
-  const auto boundary = reconstruct::diffusion::make_boundary(options.boundary, ior);
-  if (!boundary) return boundary.error();
   Report report;
   auto mesh = cut(solid, options, report, stop);
   if (!mesh) return mesh.error();
+  DiffusionOptions spaced = options;
+  spaced.spacing_mm = report.spacing_mm;
+  auto made = create(*std::move(mesh), solid, material, ior, spaced, team, std::move(stop));
+  if (made) (*made)->report_.mesh_seconds = report.mesh_seconds;
+  return made;
+}
+
+Result<std::unique_ptr<Subsurface>> Subsurface::create(TetMesh mesh,
+                                                       const SignedDistance& solid,
+                                                       const MaterialAt& material,
+                                                       double ior,
+                                                       const DiffusionOptions& options,
+                                                       ThreadTeam& team,
+                                                       std::stop_token stop) {
+  const auto boundary = reconstruct::diffusion::make_boundary(options.boundary, ior);
+  if (!boundary) return boundary.error();
   const auto start = std::chrono::steady_clock::now();
+  Report report;
+  report.spacing_mm = options.spacing_mm;
+  take_quality(mesh, report);
   auto made =
-      set_up(*std::move(mesh), solid, material, *boundary, options, report.spacing_mm, team, stop);
+      set_up(std::move(mesh), solid, material, *boundary, options, report.spacing_mm, team, stop);
   if (!made) return made.error();
   Report& own = (*made)->report_;
   report.unknowns =

@@ -54,6 +54,14 @@ class Subsurface {
                                                     const DiffusionOptions& options,
                                                     ThreadTeam& team,
                                                     std::stop_token stop);
+  /// The same of tetrahedra that somebody else has cut, which `solid` encloses. Needs a valid mesh.
+  static Result<std::unique_ptr<Subsurface>> create(TetMesh mesh,
+                                                    const SignedDistance& solid,
+                                                    const MaterialAt& material,
+                                                    double ior,
+                                                    const DiffusionOptions& options,
+                                                    ThreadTeam& team,
+                                                    std::stop_token stop);
   virtual ~Subsurface() = default;
 
   /// Of the next solutions: the dial between speed and accuracy.

@@ -7,6 +7,7 @@
 
 #include "base/io/volume_io.h"
 #include "render/edit/material_block.h"
+#include "render/graph/quad_graph.h"
 #include "render/scene/solid.h"
 
 namespace opaline::render {
@@ -40,13 +41,11 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
   body->notes_ = std::move(shape->notes);
   body->load_seconds_ =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  auto light = Subsurface::create(
-      *body->solid_,
-      [&](Vec3 place) { return body->material_->at(place); },
-      body->ior(),
-      diffusion,
-      team,
-      stop);
+  const Subsurface::MaterialAt at = [&](Vec3 place) { return body->material_->at(place); };
+  auto light = shape->tets
+                   ? Subsurface::create(
+                         pack(*shape->tets), *body->solid_, at, body->ior(), diffusion, team, stop)
+                   : Subsurface::create(*body->solid_, at, body->ior(), diffusion, team, stop);
   if (!light) return light.error();
   body->subsurface_ = *std::move(light);
   body->rest_box_ = body->own_box(0.0);

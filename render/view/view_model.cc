@@ -147,7 +147,7 @@ Result<std::size_t> ViewModel::paint(double x, double y, int width, int height, 
   if (body == nullptr) return std::size_t{0};
   brush.centre = body->own_place(place->vertex);
   brush.direction = body->own_normal(place->vertex);
-  const auto cells = body->edit({brush});
+  auto cells = body->edit({brush});
   if (!cells || *cells == 0) return cells;
   done_.push_back(place->object);
   undone_.clear();
@@ -162,7 +162,7 @@ Result<std::size_t> ViewModel::paint_all(std::size_t object, EditOptions brush) 
   brush.radius_mm = kEverywhere;
   brush.softness = 0.0;
   brush.mask.clear();
-  const auto cells = body->edit({brush});
+  auto cells = body->edit({brush});
   if (!cells || *cells == 0) return cells;
   done_.push_back(object);
   undone_.clear();
@@ -201,7 +201,7 @@ Result<std::size_t> ViewModel::bend(std::size_t object, double amount) {
   if (deform.kind == DeformOptions::Kind::kNone) return std::size_t{0};
   deform.amount = amount;
   deform.inverted = DeformOptions::Inverted::kMark;
-  const auto inverted = renderer_->bend(object, deform, {});
+  auto inverted = renderer_->bend(object, deform, {});
   if (inverted) {
     scene_.objects[object].deform.amount = amount;
     changed();

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "render/graph/nearest.h"
 #include "render/mesh/mesh_distance.h"
@@ -107,14 +108,12 @@ double Body::error_against_a_mesh_of_the_bent_shape(double tetrahedra, Discretis
   return difference(body->subsurface().lit().fluence, expected);
 }
 
-// Two meshes of one shape differ by their own errors, and those of elements fall with the square of their size: by 2.5 from
-// 6 k to 24 k, of which 1.6 is asked for. Two-point volumes are not consistent on bent tetrahedra: 5 % at 8 k stays 4 %.
+// Two meshes of one shape differ by their own errors and by what interpolation between them adds. Those of elements fall with
+// the square of their size (3.5 % at 8 k, 2.0 % at 20 k: docs/rendering.md); two-point volumes are not consistent on bent
+// tetrahedra and stay at 4 to 5 %. The bend itself changes the light by 8 %.
 TEST_F(Body, BentShinesAsAMeshMadeOfTheBentShape) {
-  const double coarse = error_against_a_mesh_of_the_bent_shape(6e3, Discretisation::kElements);
-  const double fine = error_against_a_mesh_of_the_bent_shape(2.4e4, Discretisation::kElements);
-  EXPECT_LT(coarse, 0.06);
-  EXPECT_LT(1.6 * fine, coarse) << fine;
-  EXPECT_LT(error_against_a_mesh_of_the_bent_shape(8e3, Discretisation::kGraph), 0.06);
+  EXPECT_LT(error_against_a_mesh_of_the_bent_shape(8e3, Discretisation::kElements), 0.045);
+  EXPECT_LT(error_against_a_mesh_of_the_bent_shape(8e3, Discretisation::kGraph), 0.065);
 }
 
 TEST_F(Body, BentAndStraightenedShinesAsBefore) {
@@ -123,7 +122,7 @@ TEST_F(Body, BentAndStraightenedShinesAsBefore) {
   const Values before = body->subsurface().lit().fluence;
   ASSERT_TRUE(body->bend(bow(5.0)));
   solve(*body);
-  EXPECT_GT(difference(body->subsurface().lit().fluence, before), 0.05);
+  EXPECT_GT(difference(body->subsurface().lit().fluence, before), 0.07);
   DeformOptions none = bow(5.0);
   none.amount = 0.0;
   ASSERT_TRUE(body->bend(none));
@@ -164,6 +163,39 @@ TEST_F(Body, TurnedInsideOutIsMarkedWhereAskedFor) {
 TEST_F(Body, OnALatticeIsNotBent) {
   const auto body = made(torus(), {.method = Discretisation::kPolygrid, .tetrahedra = 5e3});
   EXPECT_THAT(body->bend(bow(1.0)).error().message, HasSubstr("a lattice cannot bend"));
+}
+
+TEST_F(Body, OfATetrahedralFileShinesAsTheSameShapeCutHere) {
+  const auto cut = made(torus(), {.tetrahedra = 5e3, .tolerance = 1e-7});
+  solve(*cut);
+  const auto solid = make_shape("torus", 20.0);
+  const TetMesh mesh = *stuff(
+      **solid, {.spacing_mm = cut->subsurface().report().spacing_mm, .interior_growth = 0.1}, {});
+  ObjectOptions from_file = torus();
+  from_file.shape.name.clear();
+  from_file.shape.file = directory_.path() / "torus.mesh";
+  from_file.shape.unit_mm = 10.0;
+  std::ofstream file(from_file.shape.file);
+  file.precision(17);
+  file << "MeshVersionFormatted 2 Dimension 3\nVertices " << mesh.vertices.size() << '\n';
+  for (const Vec3& p : mesh.vertices)
+    file << 0.1 * p.x << ' ' << 0.1 * p.y << ' ' << 0.1 * p.z << " 0\n";
+  file << "Tetrahedra " << mesh.tets.size() << '\n';
+  for (const auto& [a, b, c, d] : mesh.tets) {
+    file << a + 1 << ' ' << b + 1 << ' ' << d + 1 << ' ' << c + 1 << " 0\n";  // turned
+  }
+  file << "End\n";
+  file.close();
+  const auto read = made(from_file, {.tolerance = 1e-7});
+  EXPECT_EQ(read->subsurface().report().tetrahedra, mesh.tets.size());
+  EXPECT_NEAR(
+      read->subsurface().report().spacing_mm / cut->subsurface().report().spacing_mm, 1.0, 0.1);
+  const Subsurface& theirs = read->subsurface();
+  ASSERT_EQ(theirs.surface().vertices.size(), cut->subsurface().surface().vertices.size());
+  Values q =
+      light_from_above(cut->subsurface());  // of the true surface, as the other's facets are not
+  ASSERT_TRUE(read->subsurface().light(q, {}, {}));
+  EXPECT_LT(difference(theirs.lit().fluence, cut->subsurface().lit().fluence), 1e-5);
 }
 
 EditOptions dark_spot() {
