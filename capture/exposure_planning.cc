@@ -97,7 +97,8 @@ class Branches {
       for (std::size_t i = 3 * cell; i < 3 * cell + 3; ++i) {
         if (missing[i] <= 0.0) continue;
         const double speed = exposures == 0 ? 0.0 : fastest_[exposures - 1][i];
-        seconds = std::max(seconds, speed > 0.0 ? missing[i] / speed : kNever);
+        const double needed = speed > 0.0 ? missing[i] / speed : kNever;
+        seconds = std::max(seconds, needed);
       }
       needs_[cell] = seconds;
     }

@@ -44,8 +44,8 @@ def without_clashes(files):
     groups = []
     for file in sorted(files):
         own, used = names(file)
-        for group in groups[-OPEN_GROUPS:]:
-            if len(group['files']) < LARGEST_GROUP and not own & (group['own'] | group['used']) and not used & group['own']:
+        for group in [group for group in groups if len(group['files']) < LARGEST_GROUP][-OPEN_GROUPS:]:
+            if not own & (group['own'] | group['used']) and not used & group['own']:
                 break
         else:
             group = {'files': [], 'own': set(), 'used': set()}

@@ -53,9 +53,10 @@ BoardOptics::BoardOptics(const CameraOptics& camera,
   for (int y = 0; y < camera.model.height; ++y) {
     for (int x = 0; x < camera.model.width; ++x) {
       for (std::size_t k = 0; k < kPlaces; ++k) {
+        const std::size_t down = k / kAcross;
         const auto ray = ray_of(camera.model,
                                 x + (static_cast<double>(k % kAcross) + 0.5) / kAcross,
-                                y + (static_cast<double>(k / kAcross) + 0.5) / kAcross);
+                                y + (static_cast<double>(down) + 0.5) / kAcross);
         rays_.push_back(static_cast<float>(ray[0]));
         rays_.push_back(static_cast<float>(ray[1]));
       }

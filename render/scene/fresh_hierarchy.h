@@ -24,7 +24,7 @@ class FreshHierarchy {
                                              std::vector<Lanes<T>>& x,
                                              const reconstruct::diffusion::SolveOptions& options,
                                              std::stop_token stop) {
-    const auto summary = solver_.solve(b, x, options, std::move(stop));
+    auto summary = solver_.solve(b, x, options, std::move(stop));
     if (cold_iterations_ == 0) cold_iterations_ = summary.iterations;
     stale_ = 2 * summary.iterations > 3 * std::max(cold_iterations_, 1);
     return summary;

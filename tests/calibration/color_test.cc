@@ -125,7 +125,8 @@ TEST(ChartFinder, FindsTheChartHoweverItLies) {
   Photographed scene;
   for (int turn = 0; turn < 4; ++turn) {
     EXPECT_LT(corner_error(scene.found(0.02, 1), scene.chart), 7.0) << "turned by " << turn;
-    std::ranges::rotate(scene.chart.corners, scene.chart.corners.begin() + 2);
+    auto& corners = scene.chart.corners;
+    std::rotate(corners.begin(), corners.begin() + 2, corners.end());
     if (turn == 1) scene.chart.corners = {{{185, 45}, {180, 215}, {70, 210}, {75, 50}}};
   }
 }
