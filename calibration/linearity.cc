@@ -215,6 +215,7 @@ void note_response(StepContext& context,
   context.record.measured.response =
       linear ? capture::ResponseCurve{} : fits[1].curve;  // green, until radiometric
   record.values["departure_from_line"] = departure;
+  record.values["curve"] = fits[1].curve.table;
   record.values["linear"] = linear;
 }
 

@@ -121,6 +121,11 @@ void note_noise(StepContext& context,
   m.gain_electrons_per_code = mean_of(gains);
   m.read_noise_electrons = dark ? *dark * mean_of(gains) : mean_of(reads);
   record.values["gain_electrons_per_code"] = gains;
+  for (const PhotonTransfer& t : channels) {
+    nlohmann::json levels = nlohmann::json::array();
+    for (const NoiseLevel& level : t.levels) levels.push_back({level.mean, level.variance});
+    record.values["photon_transfer"].push_back(std::move(levels));
+  }
   record.values["read_noise_electrons"] = *m.read_noise_electrons;
   record.values["read_noise_resolved"] = resolved || dark;
   const auto [low, high] = std::ranges::minmax(gains);

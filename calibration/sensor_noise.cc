@@ -205,10 +205,13 @@ Result<PhotonTransfer> photon_transfer(std::span<const FramePair> pairs,
         "not linear");
   const double gain = 1.0 / line.slope;
   const bool resolved = line.at_zero > kResolved * kResolved;
-  return PhotonTransfer{gain,
-                        gain * (resolved ? std::sqrt(line.at_zero) : 0.5),
-                        resolved,
-                        line.slope_deviation * gain * gain};
+  PhotonTransfer found{gain,
+                       gain * (resolved ? std::sqrt(line.at_zero) : 0.5),
+                       resolved,
+                       line.slope_deviation * gain * gain,
+                       {}};
+  for (const Level& level : levels) found.levels.push_back({level.mean, level.variance});
+  return found;
 }
 
 Result<DarkFrame> measure_dark(std::span<const Image<std::uint16_t>* const> frames) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -15,6 +16,12 @@ struct FramePair {
   const Image<std::uint16_t>* second = nullptr;  ///< outlives the call
 };
 
+/// Samples of one light in one pair: codes above black of a linear sensor, and their variance, codes^2.
+struct NoiseLevel {
+  double mean = 0.0;
+  double variance = 0.0;  ///< without that of quantisation
+};
+
 /// What a linear sensor's own noise tells of it.
 struct PhotonTransfer {
   double electrons_per_code = 0.0;
@@ -23,6 +30,7 @@ struct PhotonTransfer {
   bool read_noise_resolved =
       true;  ///< false below half a code, where rounding is no longer noise of 1/12: it is at most that
   double electrons_per_code_deviation = 0.0;  ///< standard, of the fit
+  std::vector<NoiseLevel> levels;             ///< that it was fitted to
 };
 
 /// Gain K and read noise r of one channel of a linear sensor from photon transfer (Janesick 2007, chapter 5; EMVA 1288):

@@ -16,6 +16,7 @@
 #include "calibration/procedure.h"
 #include "calibration/store.h"
 #include "config/session_config.h"
+#include "daemon/calibrate/calibration_report.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
 #include "daemon/driver_table.h"
@@ -180,6 +181,21 @@ Result<void> conclude(const Record& record, const Store& store, const std::strin
   return ok();
 }
 
+/// Beside the calibration; compared with the active one, or with the one before where it is that itself.
+Result<void> write_report(const Record& record, const Store& store) {
+  std::optional<Record> before;
+  for (const int version : store.versions()) {
+    if (version >= record.version) break;
+    auto older = store.read(version);
+    if (older && older->state() == RecordState::kAccepted) before = *std::move(older);
+  }
+  const fs::path path = store.directory_of(record.version) / "report.html";
+  const std::string page = calibration_page(record, before, {});
+  if (auto written = write_whole(system_files(), path, page); !written) return written;
+  fmt::print("{}\n", path.string());
+  return ok();
+}
+
 Result<void> run(const Arguments& arguments) {
   if (!arguments.step.empty()) {
     if (auto known = calibration::step_index(arguments.step); !known) return known.error();
@@ -203,6 +219,8 @@ Result<void> run(const Arguments& arguments) {
     return cancelled(fmt::format("stopped; go on with \"opaline calibrate --resume {}\"",
                                  arguments.rig.string()));
   if (!done) return done;
+  if (auto written = write_report(*record, store); !written)
+    fmt::print(stderr, "opaline-calibrate: {}\n", written.error().message);
   return conclude(*record, store, arguments.rig.string());
 }
 

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "calibration/record.h"
+
+namespace opaline::daemon {
+
+/// A calibration as a page of HTML that needs no other file: every gate with its figure and limit, what was measured and how it has
+/// drifted since `before`, the plots of calibration_plots.h. A plot that cannot be drawn carries the reason.
+std::string calibration_page(const calibration::Record& record,
+                             const std::optional<calibration::Record>& before,
+                             const std::stop_token& stop);
+
+}  // namespace opaline::daemon
