@@ -16,7 +16,7 @@ namespace opaline::calibration {
 /// A ChArUco board has an ArUco marker of the dictionary DICT_4X4_50 in each white square (Garrido-Jurado et al. 2014), in
 /// order from the upper left, so that it may be partly hidden. The square in the upper left corner is black.
 struct Board {
-  enum class Kind : std::uint8_t { kChessboard, kCharuco };
+  enum class Kind : std::uint8_t { kNone, kChessboard, kCharuco };
   Kind kind = Kind::kChessboard;
   int squares_x = 10;
   int squares_y = 7;

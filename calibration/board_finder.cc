@@ -200,6 +200,8 @@ Result<void> validate(const Board& board) {
     return invalid_argument(
         fmt::format("board: {} = {}; expected 3 to {}", name, value, kMostSquares));
   };
+  if (board.kind == Board::Kind::kNone)
+    return invalid_argument("board: kind = \"none\"; expected \"chessboard\" or \"charuco\"");
   if (board.squares_x < 3 || board.squares_x > kMostSquares)
     return count("squares_x", board.squares_x);
   if (board.squares_y < 3 || board.squares_y > kMostSquares)

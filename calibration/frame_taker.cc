@@ -98,13 +98,11 @@ Result<Frame> FrameTaker::checked(std::uint64_t pattern,
   return frame;
 }
 
-Result<Frame> FrameTaker::attempt_lit(const FlatLight& light,
+Result<Frame> FrameTaker::attempt_lit(const Image<std::uint8_t>& codes,
+                                      const std::string& name,
                                       nanoseconds exposure,
                                       const std::stop_token& stop) {
-  Image<std::uint8_t> codes(projector_.width, projector_.height, 3);
-  for (std::size_t i = 0; i < codes.samples().size(); ++i) codes.samples()[i] = light[i % 3];
-  const std::string name = fmt::format("flat_{}_{}_{}", light[0], light[1], light[2]);
-  const drivers::Pattern pattern{++next_pattern_, std::move(codes), name};
+  const drivers::Pattern pattern{++next_pattern_, codes, name};
   if (auto shown = station_.projector.show(pattern, stop); !shown)
     return shown.error().in("projector");
   const nanoseconds settle = projector_.latency + projector_.frame_period * kSettlePeriods;
@@ -136,10 +134,32 @@ Result<Frame> FrameTaker::retried(const std::string& name,
 
 Result<Frame> FrameTaker::lit(const FlatLight& light, int turns, std::stop_token stop) {
   const nanoseconds exposure = turn() * turns;
+  Image<std::uint8_t> codes(projector_.width, projector_.height, 3);
+  for (std::size_t i = 0; i < codes.samples().size(); ++i) codes.samples()[i] = light[i % 3];
+  const std::string name = fmt::format("flat_{}_{}_{}", light[0], light[1], light[2]);
   return retried(
       fmt::format("light {} {} {} for {:.4g} s", light[0], light[1], light[2], seconds(exposure)),
-      [&] { return attempt_lit(light, exposure, stop); },
+      [&] { return attempt_lit(codes, name, exposure, stop); },
       stop);
+}
+
+Result<Frame> FrameTaker::pictured(const Image<std::uint8_t>& grey,
+                                   const std::string& name,
+                                   int turns,
+                                   std::stop_token stop) {
+  const nanoseconds exposure = turn() * turns;
+  Image<std::uint8_t> codes(grey.width(), grey.height(), 3);
+  for (std::size_t i = 0; i < codes.samples().size(); ++i)
+    codes.samples()[i] = grey.samples()[i / 3];
+  return retried(
+      fmt::format("{} for {:.4g} s", name, seconds(exposure)),
+      [&] { return attempt_lit(codes, name, exposure, stop); },
+      stop);
+}
+
+Result<void> FrameTaker::rest(nanoseconds time, std::stop_token stop) {
+  if (auto dark = station_.projector.dark(); !dark) return dark.error().in("projector");
+  return pause(time, std::move(stop));
 }
 
 Result<Frame> FrameTaker::dark(nanoseconds exposure, std::stop_token stop) {

@@ -39,6 +39,13 @@ class FrameTaker {
 
   /// `turns` of the colour wheel under a light; shows and settles first.
   Result<Frame> lit(const FlatLight& light, int turns, std::stop_token stop);
+  /// `turns` of the colour wheel under a picture of grey codes, one channel, of the projector's size.
+  Result<Frame> pictured(const Image<std::uint8_t>& grey,
+                         const std::string& name,
+                         int turns,
+                         std::stop_token stop);
+  /// Switches the lamp off for a time, which tells whoever attends the station to do what is next.
+  Result<void> rest(std::chrono::nanoseconds time, std::stop_token stop);
   /// Lamp off.
   Result<Frame> dark(std::chrono::nanoseconds exposure, std::stop_token stop);
   /// Waits on the station's clock.
@@ -59,7 +66,8 @@ class FrameTaker {
   Result<Frame> retried(const std::string& name,
                         const std::function<Result<Frame>()>& attempt,
                         const std::stop_token& stop);
-  Result<Frame> attempt_lit(const FlatLight& light,
+  Result<Frame> attempt_lit(const Image<std::uint8_t>& codes,
+                            const std::string& name,
                             std::chrono::nanoseconds exposure,
                             const std::stop_token& stop);
   Result<Frame> attempt_dark(std::chrono::nanoseconds exposure, const std::stop_token& stop);

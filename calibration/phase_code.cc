@@ -162,7 +162,7 @@ Image<std::uint8_t> phase_pattern(const PhasePlan& plan, int index) {
       const double place = (axis == 0 ? x : y) + 0.5;
       const double light = 0.5 + 0.5 * std::cos(kTurn * (place / plan.period(level) - shift));
       codes.at(x, y) = static_cast<std::uint8_t>(
-          std::lround(255.0 * std::pow(std::max(0.0, light), 1.0 / plan.gamma)));
+          std::lround(plan.white * std::pow(std::max(0.0, light), 1.0 / plan.gamma)));
     }
   }
   return codes;

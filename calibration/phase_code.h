@@ -14,7 +14,7 @@ namespace opaline::calibration {
 /// Sinusoids that tell each camera pixel which place of the projector's picture lights it. For each axis and each of `periods`, the
 /// longest longer than the picture, `steps` patterns k = 0, 1, ...
 ///
-///   light_k = 1/2 + 1/2 cos(2 pi (x / period - k / steps)),   code = 255 light^(1/gamma)
+///   light_k = 1/2 + 1/2 cos(2 pi (x / period - k / steps)),   code = white light^(1/gamma)
 ///
 /// with x in projector pixels. From the light I_k that a pixel sees,
 ///
@@ -25,6 +25,7 @@ struct PhasePlan {
   int width = 640;  ///< of the projector's picture
   int height = 480;
   double gamma = 2.2;
+  std::uint8_t white = 255;                                     ///< the code of the most light
   std::array<double, 3> shares{1.25, 1.25 / 8.0, 1.25 / 48.0};  ///< periods over the longer side
   int steps = 4;
 

@@ -15,7 +15,7 @@ namespace {
 
 using Step = Result<StepRecord> (*)(StepContext&);
 constexpr std::array<Step, kSteps.size() + kExtraSteps.size()> kDo{
-    warm_up, black_level, linearity, radiometric, check, color};
+    warm_up, black_level, linearity, radiometric, geometry, check, color};
 
 std::string_view name_of_step(std::size_t step) {
   return step < kSteps.size() ? kSteps[step] : kExtraSteps[step - kSteps.size()];
@@ -56,9 +56,18 @@ bool accepted_before(const Record& record, std::size_t step) {
   return found != nullptr && found->accepted();
 }
 
-Result<void> check_order(const Record& record, std::size_t wanted) {
+bool is_part(std::size_t step, const GeometryOptions& geometry) {
+  return name_of_step(step) != kGeometryStep || geometry.has_board();
+}
+
+Result<void> check_order(const Record& record,
+                         std::size_t wanted,
+                         const GeometryOptions& geometry) {
+  if (!is_part(wanted, geometry))
+    return invalid_argument(
+        "step geometry needs a board: describe it in [calibration.board] of the rig file");
   for (std::size_t i = 1; i < std::min(wanted, kSteps.size()); ++i) {
-    if (accepted_before(record, i)) continue;
+    if (accepted_before(record, i) || !is_part(i, geometry)) continue;
     return invalid_argument(
         fmt::format("step {} needs {}, which has not been accepted: do that first, with "
                     "\"--step {}\", or all with \"--resume\"",
@@ -109,15 +118,15 @@ Result<void> run_procedure(Record& record,
   if (options.only) {
     const auto index = step_index(*options.only);
     if (!index) return index.error();
-    if (auto order = check_order(record, *index); !order) return order;
+    if (auto order = check_order(record, *index, options.geometry); !order) return order;
     only = *index;
   }
   const auto taker = FrameTaker::create(station, events);
   if (!taker) return taker.error();
   if (auto same = same_devices(record, **taker); !same) return same;
-  StepContext context{**taker, given, record, events, stop};
+  StepContext context{**taker, given, record, events, stop, {}, options.geometry};
   for (std::size_t i = 0; i < kDo.size(); ++i) {
-    if (!is_due(record, i, only)) continue;
+    if (!is_part(i, options.geometry) || !is_due(record, i, only)) continue;
     context.step = name_of_step(i);
     auto done = kDo[i](context);
     if (!done) return done.error().in(std::string(name_of_step(i)));

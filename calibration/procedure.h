@@ -8,6 +8,7 @@
 
 #include "base/events.h"
 #include "base/result.h"
+#include "calibration/geometry_options.h"
 #include "calibration/record.h"
 #include "capture/station.h"
 
@@ -16,6 +17,7 @@ namespace opaline::calibration {
 /// Which steps are done.
 struct ProcedureOptions {
   std::optional<std::string> only;  ///< one step; those before it must have been accepted
+  GeometryOptions geometry;         ///< without a board there is no such step
 };
 
 /// Keeps the record on disk after each step.
@@ -25,7 +27,7 @@ using Keep = std::function<Result<void>(const Record&)>;
 /// of the others counts, is always; the first one refused ends the procedure, for nothing after it could be believed.
 ///
 /// Facts: step.finished {step, accepted, message}, and frame.retaken. Progress: by step.
-/// Errors: kInvalidArgument when `only` lacks a step before it, or the devices are not those of the record; and what the
+/// Errors: kInvalidArgument when `only` lacks a step before it, or a board, or the devices are not those of the record; and what the
 /// devices return. A gate that fails is not an error: see Record::state().
 Result<void> run_procedure(Record& record,
                            const ProcedureOptions& options,

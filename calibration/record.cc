@@ -55,6 +55,21 @@ std::string_view kind_name(capture::ResponseCurve::Kind kind) {
   return "linear";
 }
 
+ordered_json to_json(const MeasuredLens& lens) {
+  const CameraModel& m = lens.model;
+  const Vec3 t = m.camera_from_sample.translation;
+  return {{"width", m.width},
+          {"height", m.height},
+          {"fx", m.fx},
+          {"fy", m.fy},
+          {"cx", m.cx},
+          {"cy", m.cy},
+          {"distortion", m.distortion},
+          {"deviation", lens.deviation},
+          {"rotation", m.camera_from_sample.rotation},
+          {"translation_mm", {t.x, t.y, t.z}}};
+}
+
 ordered_json to_json(const Measured& m) {
   ordered_json out = ordered_json::object();
   const auto put = [&](const char* key, const std::optional<double>& value) {
@@ -80,6 +95,8 @@ ordered_json to_json(const Measured& m) {
   }
   for (const capture::ExposureFactor& f : m.exposure_factors)
     out["exposure_factors"].push_back({{"reported_s", f.reported_s}, {"factor", f.factor}});
+  if (m.camera_lens) out["camera_lens"] = to_json(*m.camera_lens);
+  if (m.projector_lens) out["projector_lens"] = to_json(*m.projector_lens);
   return out;
 }
 
@@ -127,6 +144,23 @@ ColorCorrection color_from(const json& in) {
   return color;
 }
 
+MeasuredLens lens_from(const json& in) {
+  MeasuredLens lens;
+  CameraModel& m = lens.model;
+  m.width = in.at("width").get<int>();
+  m.height = in.at("height").get<int>();
+  m.fx = in.at("fx").get<double>();
+  m.fy = in.at("fy").get<double>();
+  m.cx = in.at("cx").get<double>();
+  m.cy = in.at("cy").get<double>();
+  m.distortion = in.at("distortion").get<std::array<double, 5>>();
+  lens.deviation = in.at("deviation").get<std::array<double, 9>>();
+  m.camera_from_sample.rotation = in.at("rotation").get<std::array<double, 9>>();
+  const auto t = in.at("translation_mm").get<std::array<double, 3>>();
+  m.camera_from_sample.translation = {t[0], t[1], t[2]};
+  return lens;
+}
+
 Measured measured_from(const json& in) {
   const auto number = [&](const char* key) {
     const auto found = in.find(key);
@@ -147,6 +181,8 @@ Measured measured_from(const json& in) {
   if (in.contains("color")) m.color = color_from(in.at("color"));
   for (const json& f : in.value("exposure_factors", json::array()))
     m.exposure_factors.push_back({f.at("reported_s").get<double>(), f.at("factor").get<double>()});
+  if (in.contains("camera_lens")) m.camera_lens = lens_from(in.at("camera_lens"));
+  if (in.contains("projector_lens")) m.projector_lens = lens_from(in.at("projector_lens"));
   return m;
 }
 
@@ -189,15 +225,17 @@ void Record::put(StepRecord step) {
     *found = std::move(step);
     return;
   }
-  steps.erase(found, steps.end());
+  const auto place = step_index(step.step);
+  std::erase_if(steps, [&](const StepRecord& other) {
+    const auto theirs = step_index(other.step);
+    return place && theirs && *theirs >= *place;
+  });
   steps.push_back(std::move(step));
 }
 
 RecordState Record::state() const {
   if (!std::ranges::all_of(steps, &StepRecord::accepted)) return RecordState::kRefused;
-  const bool all =
-      std::ranges::all_of(kSteps, [this](std::string_view step) { return find(step) != nullptr; });
-  return all ? RecordState::kAccepted : RecordState::kIncomplete;
+  return find(kSteps.back()) != nullptr ? RecordState::kAccepted : RecordState::kIncomplete;
 }
 
 double Record::margin() const {
@@ -268,6 +306,11 @@ capture::StationCalibration with_measured(capture::StationCalibration given,
     if (*measured.clipping_code < camera.max_code())
       camera.full_well_electrons =
           capture::electrons_from_code(camera, *measured.clipping_code).signal;
+  }
+  if (measured.camera_lens) {
+    const Pose place = camera.model.camera_from_sample;
+    camera.model = measured.camera_lens->model;
+    camera.model.camera_from_sample = place;
   }
   if (measured.projector_gamma) given.projector.gamma = *measured.projector_gamma;
   return given;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/camera_model.h"
 #include "base/result.h"
 #include "calibration/color_fit.h"
 #include "capture/calibration.h"
@@ -14,8 +15,10 @@
 namespace opaline::calibration {
 
 /// The steps in the order that they must be done: each believes what those before it found.
-inline constexpr std::array<std::string_view, 5> kSteps{
-    "warm_up", "black_level", "linearity", "radiometric", "check"};
+inline constexpr std::array<std::string_view, 6> kSteps{
+    "warm_up", "black_level", "linearity", "radiometric", "geometry", "check"};
+/// Done only where the rig file has a board.
+inline constexpr std::string_view kGeometryStep = "geometry";
 /// Steps that are done when asked for, once all of kSteps are accepted: sessions do without.
 inline constexpr std::array<std::string_view, 1> kExtraSteps{"colour"};
 /// Place of a step in kSteps, kExtraSteps behind them. Errors: kInvalidArgument listing them.
@@ -52,6 +55,13 @@ struct DeviceIdentity {
   bool operator==(const DeviceIdentity&) const = default;
 };
 
+/// A lens as measured: its place, and the standard deviations of fx fy cx cy k1 k2 p1 p2 k3.
+struct MeasuredLens {
+  CameraModel
+      model;  ///< camera_from_sample: of a projector, projector_from_camera; of a camera, the identity
+  std::array<double, 9> deviation{};
+};
+
 /// What the steps have measured so far; a step sets what it finds.
 struct Measured {
   std::optional<double> black_level;  ///< code without light
@@ -65,6 +75,8 @@ struct Measured {
   std::optional<double> read_noise_electrons;
   std::optional<ColorCorrection> color;                   ///< of light above black, in any unit
   std::vector<capture::ExposureFactor> exposure_factors;  ///< empty: the camera reports them right
+  std::optional<MeasuredLens> camera_lens;
+  std::optional<MeasuredLens> projector_lens;
 };
 
 enum class RecordState : std::uint8_t { kIncomplete, kRefused, kAccepted };
@@ -85,7 +97,7 @@ struct Record {
   Measured measured;
 
   const StepRecord* find(std::string_view step) const;
-  /// The step's record anew, and none of those after it, which rested on the old one; but a warm-up changes nothing that
+  /// The step's record anew, in its place, and none of those after it, which rested on the old one; but a warm-up changes nothing that
   /// they found.
   void put(StepRecord step);
   RecordState state() const;
@@ -98,8 +110,8 @@ std::string to_text(const Record& record);
 /// Errors: kInvalidArgument for what is damaged, saying where, or written by a newer version.
 Result<Record> record_from_text(std::string_view text, const std::string& file);
 
-/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times and hot pixels,
-/// and the projector's gamma, as measured. The sensitivity follows the gain, so that codes per radiance, which is what the one
+/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times, hot pixels
+/// and lens, and the projector's gamma, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
 /// who gave it had measured, stay as given.
 capture::StationCalibration with_measured(capture::StationCalibration given,
                                           const Measured& measured);

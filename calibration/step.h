@@ -10,6 +10,7 @@
 #include "base/frame.h"
 #include "base/result.h"
 #include "calibration/frame_taker.h"
+#include "calibration/geometry_options.h"
 #include "calibration/record.h"
 #include "calibration/response_fit.h"
 
@@ -23,6 +24,7 @@ struct StepContext {
   EventSink& events;
   std::stop_token stop;
   std::string_view step = {};
+  GeometryOptions geometry = {};
 
   void progress(double fraction, std::string_view doing) const;
 };
@@ -32,6 +34,8 @@ Result<StepRecord> warm_up(StepContext& context);
 Result<StepRecord> black_level(StepContext& context);
 Result<StepRecord> linearity(StepContext& context);
 Result<StepRecord> radiometric(StepContext& context);
+/// Shows the board in all poses (pose_taker.h) and fits both lenses (pair_fit.h), with the projector's place.
+Result<StepRecord> geometry(StepContext& context);
 Result<StepRecord> check(StepContext& context);
 Result<StepRecord> color(StepContext& context);
 

@@ -38,6 +38,14 @@ const std::set<std::string> kVolumes{"libImath-3_1", "libopenvdb", "libtbb"};
 const std::set<std::string> kProcessor{"libhwy"};
 const std::set<std::string> kWindows{"libglfw", "libstb", "libvulkan"};
 const std::set<std::string> kUsb{"libusb-1.0"};
+const std::set<std::string> kLenses{"libceres",
+                                    "libglog",
+                                    "libopencv_aruco",
+                                    "libopencv_calib3d",
+                                    "libopencv_core",
+                                    "libopencv_features2d",
+                                    "libopencv_flann",
+                                    "libopencv_imgproc"};
 
 std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
   std::set<std::string> all;
@@ -48,7 +56,7 @@ std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
 const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline", {"libcurl"}},
     {"opalined", {"libsqlite3"}},
-    {"opaline-calibrate", join({kPictures, kUsb})},
+    {"opaline-calibrate", join({kLenses, kPictures, kUsb})},
     {"opaline-capture", join({kPictures, kUsb})},
     {"opaline-guardian", kUsb},
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},

@@ -1,0 +1,129 @@
+#include "calibration/pose_taker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/board_finder.h"
+
+namespace opaline::calibration {
+namespace {
+
+constexpr double kTooBright = 0.90;  // of the highest code
+constexpr double kDimmedTo = 0.75;   // of the light
+constexpr int kDimmings = 8;
+constexpr double kFew = 0.002;              // of pixels, may be full
+constexpr double kLeastModulation = 0.004;  // of the range
+
+Image<float> grey_light(const Frame& frame, std::span<const double> linear) {
+  Image<float> grey(frame.pixels.width(), frame.pixels.height(), 1);
+  const auto codes = frame.pixels.samples();
+  for (std::size_t i = 0; i < codes.size(); ++i)
+    grey.samples()[i / 3] += static_cast<float>(linear[codes[i]] / 3.0);
+  return grey;
+}
+
+bool is_too_bright(const Frame& frame, double highest) {
+  const auto codes = frame.pixels.samples();
+  const auto full =
+      std::ranges::count_if(codes, [&](std::uint16_t code) { return code > kTooBright * highest; });
+  return static_cast<double>(full) > kFew * static_cast<double>(codes.size());
+}
+
+Image<std::uint8_t> even(const FrameTaker& taker, std::uint8_t code) {
+  return {taker.projector().width, taker.projector().height, 1, code};
+}
+
+struct White {
+  Frame frame;
+  std::uint8_t code = 255;
+};
+
+// The brightest even light under which next to nothing is full.
+Result<White> take_white(StepContext& context, const std::string& name, const Brightness& from) {
+  const double highest = linear_camera(context).max_code();
+  const double gamma = context.record.measured.projector_gamma.value_or(1.0);
+  double code = from.light[0];
+  for (int dimming = 0;; ++dimming) {
+    const auto now = static_cast<std::uint8_t>(std::lround(code));
+    auto frame = context.taker.pictured(even(context.taker, now), name, from.turns, context.stop);
+    if (!frame) return frame.error();
+    if (dimming == kDimmings || !is_too_bright(*frame, highest))
+      return White{*std::move(frame), now};
+    code *= std::pow(kDimmedTo, 1.0 / gamma);
+  }
+}
+
+// The median distance of corners that both have, px.
+double moved_by(const BoardView& before, const BoardView& after) {
+  std::vector<double> distances;
+  for (const BoardCorner& corner : before.corners) {
+    const auto same = std::ranges::find(after.corners, corner.id, &BoardCorner::id);
+    if (same == after.corners.end()) continue;
+    distances.push_back(std::hypot(same->pixel.x - corner.pixel.x, same->pixel.y - corner.pixel.y));
+  }
+  if (distances.empty()) return 0.0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::ranges::nth_element(distances, middle);
+  return *middle;
+}
+
+PhasePlan plan_of(const StepContext& context, std::uint8_t white) {
+  PhasePlan plan;
+  plan.width = context.taker.projector().width;
+  plan.height = context.taker.projector().height;
+  plan.gamma = context.record.measured.projector_gamma.value_or(plan.gamma);
+  plan.white = white;
+  return plan;
+}
+
+Result<ProjectorMap> take_patterns(StepContext& context,
+                                   const std::string& name,
+                                   std::uint8_t white,
+                                   int turns) {
+  const PhasePlan plan = plan_of(context, white);
+  const auto linear = linear_codes(linear_camera(context));
+  const CodeRange range = code_range(context);
+  std::vector<Image<float>> pictures;
+  for (int i = 0; i < plan.count(); ++i) {
+    const auto frame = context.taker.pictured(
+        phase_pattern(plan, i), fmt::format("{}, phase {}", name, i + 1), turns, context.stop);
+    if (!frame) return frame.error();
+    pictures.push_back(grey_light(*frame, linear));
+  }
+  return decode_phases(plan,
+                       pictures,
+                       kLeastModulation * (linear[static_cast<std::size_t>(range.clipping)] -
+                                           linear[static_cast<std::size_t>(range.black)]));
+}
+
+}  // namespace
+
+Result<PosePair> take_pose(StepContext& context,
+                           const std::string& name,
+                           const Brightness& brightness) {
+  const Board& board = context.geometry.board;
+  const auto white = take_white(context, name, brightness);
+  if (!white) return white.error();
+  auto before = find_board(grey_of(white->frame.pixels), board, name);
+  if (!before) return before.error();
+  if (!before->fault.empty()) return PosePair{*before, *before};
+  const auto map = take_patterns(context, name, white->code, brightness.turns);
+  if (!map) return map.error();
+  const auto last = context.taker.pictured(
+      even(context.taker, white->code), name, brightness.turns, context.stop);
+  if (!last) return last.error();
+  const auto after = find_board(grey_of(last->pixels), board, name);
+  if (!after) return after.error();
+  auto camera = find_board(grey_of(map->mean), board, name);
+  if (!camera) return camera.error();
+  const double moved = moved_by(*before, *after);
+  if (!after->fault.empty() || moved > kMayMove)
+    camera->fault = fmt::format("moved board: by {:.2f} px while the patterns were shown", moved);
+  PosePair pose{*std::move(camera), {}};
+  pose.projector = projector_view(*map, pose.camera, board);
+  return pose;
+}
+
+}  // namespace opaline::calibration
