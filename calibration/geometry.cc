@@ -180,6 +180,7 @@ nlohmann::json values_of(const PairFit& fit, double length_mm, double length_err
           {"worst_pose_px", fit.worst_view_px},
           {"median_pose_px", fit.median_view_px},
           {"poses_kept", fit.kept()},
+          {"poses_left_out", left_out(fit)},
           {"coverage", fit.camera.coverage},
           {"length_mm", length_mm},
           {"length_error", length_error},

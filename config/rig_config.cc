@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "config/block_fields.h"
+#include "config/pose_fields.h"
 
 namespace opaline::config {
 namespace {
@@ -21,31 +22,6 @@ constexpr Range kAbove0 = Range{.min = 0.0, .min_excluded = true};
 constexpr Range kPictureSize = Range{.min = 1, .max = 8192};
 constexpr Range kGamma = Range{.min = 0.1, .max = 10.0};
 constexpr Range kSeed = Range{.min = 0};
-
-bool is_rotation(const std::array<double, 9>& r) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      double product = 0.0;
-      for (int k = 0; k < 3; ++k) product += r[3 * i + k] * r[3 * j + k];
-      if (std::abs(product - (i == j ? 1.0 : 0.0)) > 1e-6) return false;
-    }
-  }
-  const Vec3 normal = cross({r[0], r[1], r[2]}, {r[3], r[4], r[5]});
-  return dot(normal, {r[6], r[7], r[8]}) > 0.0;
-}
-
-void visit_pose(Fields& fields, Pose& pose) {
-  fields.numbers({"rotation", "of the sample's frame into the camera's, 3 x 3, row by row"},
-                 pose.rotation,
-                 Range::between(-1.001, 1.001));
-  fields.check(is_rotation(pose.rotation), "rotation", "expected an orthonormal matrix, det +1");
-  std::array<double, 3> t{pose.translation.x, pose.translation.y, pose.translation.z};
-  fields.numbers({"translation", "of the same: p_camera = rotation p_sample + translation"},
-                 t,
-                 {},
-                 Unit::kLength);
-  pose.translation = {t[0], t[1], t[2]};
-}
 
 void visit_camera_model(Fields& fields, CameraModel& model, bool required) {
   fields.whole({"width", "of the picture, pixels", required}, model.width, kPictureSize);
@@ -180,6 +156,8 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
                 Range::between(1, 1000));
   fields.flag({"chart", "a ColorChecker lies before the camera instead of the sample"}, sim.chart);
   fields.table({"scene", "The sample."}, [&](Fields& f) { visit_scene(f, sim.scene); });
+  fields.table({"board", "A calibration board in place of the sample."},
+               [&](Fields& f) { visit_sim_board(f, sim.board); });
   fields.table({"camera", "What its camera does to the light."},
                [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });
   fields.table({"projector", "What its projector does with a picture."},
@@ -284,6 +262,8 @@ void visit_calibration(Fields& fields, RigConfig& rig) {
   fields.one_of({"use", "what \"opaline calibrate\" measured last, or what follows"},
                 rig.calibration_use,
                 kCalibrationUseNames);
+  fields.table({"board", "The board that \"opaline calibrate\" measures the lenses with."},
+               [&](Fields& f) { visit_board(f, rig.geometry); });
   fields.table({"camera", "The camera."}, [&](Fields& f) {
     const capture::CameraCalibration& c = rig.calibration.camera;
     const sim::CameraOptics& real = rig.sim.rig.camera;

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "base/block.h"
+#include "calibration/geometry_options.h"
 #include "capture/calibration.h"
+#include "config/board_config.h"
 #include "config/fields.h"
 #include "config/light_stage_config.h"
 #include "sim/light_transport.h"
@@ -43,6 +45,7 @@ struct SimConfig {
   std::filesystem::path socket;  ///< of opaline-rig; empty: see rig_socket()
   sim::RigOptions rig;
   sim::SceneOptions scene;
+  SimBoardConfig board;             ///< in place of the scene, if it is there
   sim::ResponseOptions transport;   ///< its camera_centre follows from the camera's pose
   std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
   std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
@@ -63,6 +66,9 @@ struct RigConfig {
   CalibrationUse calibration_use = CalibrationUse::kActive;
   /// What is believed of the devices that no active calibration has measured. On a simulated station the truth, unless given.
   capture::StationCalibration calibration;
+
+  /// The board that calibration is told of.
+  calibration::GeometryOptions geometry;
 
   bool has_stage() const { return light_stage.driver != StageDriver::kNone; }
   bool is_simulated() const {

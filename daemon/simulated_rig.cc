@@ -24,6 +24,7 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include "base/sha256.h"
 #include "config/session_config.h"
 #include "daemon/jobs/version.h"
+#include "sim/board_optics.h"
 #include "sim/color_chart.h"
 #include "sim/led_sphere.h"
 #include "sim/rig_client.h"
@@ -153,6 +154,28 @@ std::string rig_identity(const config::SimConfig& sim) {
   return sha256_hex(std::as_bytes(std::span(text)));
 }
 
+namespace {
+
+Result<std::unique_ptr<sim::Rig>> board_rig(const config::SimBoardConfig& board,
+                                            const sim::RigOptions& options,
+                                            Clock* clock) {
+  const sim::BoardSceneOptions scene = config::board_scene(board, options);
+  if (auto good = sim::validate(scene); !good) return good.error().in("sim.board");
+  if (static_cast<int>(scene.poses.size()) < board.poses) {
+    return invalid_argument(
+        fmt::format("sim.board: {} of {} poses find a place in both pictures; expected a smaller "
+                    "board, or one farther away",
+                    scene.poses.size(),
+                    board.poses));
+  }
+  return sim::Rig::create(
+      options,
+      std::make_shared<const sim::BoardOptics>(options.camera, options.projector, scene),
+      clock);
+}
+
+}  // namespace
+
 Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
                                             EventSink& events,
                                             std::stop_token stop,
@@ -170,6 +193,7 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
     return sim::Rig::create(
         options, std::shared_ptr<const sim::LightPath>(*std::move(balls)), clock);
   }
+  if (sim.board.is_there()) return board_rig(sim.board, options, clock);
   if (sim.chart) {
     return sim::Rig::create(
         options,

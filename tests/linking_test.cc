@@ -43,9 +43,11 @@ const std::set<std::string> kLenses{"libceres",
                                     "libopencv_aruco",
                                     "libopencv_calib3d",
                                     "libopencv_core",
+                                    "libopencv_dnn",
                                     "libopencv_features2d",
                                     "libopencv_flann",
-                                    "libopencv_imgproc"};
+                                    "libopencv_imgproc",
+                                    "libopencv_mcc"};
 
 std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
   std::set<std::string> all;

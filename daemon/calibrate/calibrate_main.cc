@@ -131,6 +131,7 @@ Result<void> calibrate(Record& record,
   const std::stop_callback unguarded((*guardian)->death(), request);
   calibration::ProcedureOptions options;
   if (!arguments.step.empty()) options.only = arguments.step;
+  options.geometry = rig.geometry;
   auto done = calibration::run_procedure(
       record,
       options,
@@ -227,9 +228,9 @@ Result<void> run(const Arguments& arguments) {
 int program(int argc, char** argv) {
   CLI::App app(
       "Calibrates a station's camera and projector: warm_up, black_level, linearity, radiometric, "
-      "check; and colour, when asked for with a ColorChecker before the camera.\nEach step has "
-      "gates; the first "
-      "that fails ends it, and names what to mend.");
+      "geometry (where the rig file has a board), check; and colour, when asked for with a "
+      "ColorChecker before the camera.\nEach step has "
+      "gates; the first that fails ends it, and names what to mend.");
   Arguments arguments;
   app.add_option("RIG", arguments.rig, "rig.toml")->required();
   app.add_option("--step", arguments.step, "One step only, after those before it");
@@ -243,7 +244,8 @@ int program(int argc, char** argv) {
       "  opaline-calibrate config/sim-rig.toml\n"
       "  opaline-calibrate --resume config/sim-rig.toml\n"
       "  opaline-calibrate --step black_level config/sim-rig.toml\n"
-      "  opaline-calibrate --step colour config/sim-rig-chart.toml");
+      "  opaline-calibrate --step colour config/sim-rig-chart.toml\n"
+      "  opaline-calibrate config/sim-boards.toml");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

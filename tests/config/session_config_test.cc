@@ -49,6 +49,7 @@ TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
                            "sim-rig-front-lit.toml",
                            "led_sphere.toml",
                            "sim-rig-sphere.toml",
+                           "sim-boards.toml",
                            "session.example.toml",
                            "rig.example.toml"}) {
     const auto problems = check(config_file(name));

@@ -1,0 +1,95 @@
+#include "config/board_config.h"
+
+#include <algorithm>
+
+#include "config/pose_fields.h"
+
+namespace opaline::config {
+namespace {
+
+constexpr Range kSquares{.min = 3, .max = 100};
+constexpr Range kMostPoses{.min = 6, .max = 100};
+constexpr double kDefocus = 2.5;  // px
+constexpr double kHidden = 1.0 / 3.0;
+
+template <class AnyBoard>
+void visit_squares(Fields& fields, AnyBoard& board, bool is_charuco) {
+  std::array<int, 2> squares{board.squares_x, board.squares_y};
+  fields.wholes({"squares", "columns and rows of them"}, squares, kSquares);
+  board.squares_x = squares[0];
+  board.squares_y = squares[1];
+  fields.length_mm({"square", "side of one"}, board.square_mm);
+  fields.length_mm({"marker", "side of a marker, when kind = \"charuco\""}, board.marker_mm);
+  fields.check(
+      !is_charuco || board.marker_mm < board.square_mm, "marker", "expected less than the square");
+  fields.check(!is_charuco || board.squares_x * board.squares_y / 2 <= 50,
+               "squares",
+               "expected at most 101 in all: the dictionary has 50 markers");
+}
+
+}  // namespace
+
+void visit_board(Fields& fields, calibration::GeometryOptions& geometry) {
+  calibration::Board& board = geometry.board;
+  fields.one_of({"kind", "none: lenses stay as given"}, board.kind, kBoardKindNames);
+  visit_squares(fields, board, board.kind == calibration::Board::Kind::kCharuco);
+  fields.length_mm({"known_length", "first to last inner corner of a row, by calliper"},
+                   board.known_length_mm,
+                   Range::at_least(0.0));
+  fields.check(!geometry.has_board() || board.known_length_mm > 0.0,
+               "known_length",
+               "measure with a calliper from the first to the last inner corner of a row");
+  fields.whole({"poses", "to show it in"}, geometry.poses, kMostPoses);
+  fields.duration({"time_to_move", "lamp off before each pose"}, geometry.time_to_move);
+}
+
+void visit_sim_board(Fields& fields, SimBoardConfig& board) {
+  fields.one_of({"kind", "none: the sample is there"}, board.kind, kBoardKindNames);
+  const bool is_charuco = board.kind == calibration::Board::Kind::kCharuco;
+  board.board.kind = is_charuco ? sim::SimBoardKind::kCharuco : sim::SimBoardKind::kChessboard;
+  visit_squares(fields, board.board, is_charuco);
+  fields.length_mm({"margin", "white paper around the squares"}, board.board.margin_mm);
+  fields.whole({"poses", "that it is held in, one after the other, whenever the lamp goes dark"},
+               board.poses,
+               kMostPoses);
+  fields.whole({"seed", "of the poses"}, board.seed, Range::at_least(0));
+  fields.length_mm({"distance", "from the camera, about"}, board.distance_mm);
+  fields.integers({"defocused", "poses, from 1, that are out of focus"},
+                  board.defocused,
+                  0,
+                  Range::between(1, kMostPoses.max));
+  fields.integers({"hidden", "poses, from 1, in which a hand covers a third of the board"},
+                  board.hidden,
+                  0,
+                  Range::between(1, kMostPoses.max));
+  fields.table({"projector_lens", "The projector's lens, as an inverse camera."}, [&](Fields& f) {
+    CameraModel& lens = board.projector;
+    f.number({"fx", "focal length, its pixels"}, lens.fx, Range::above(0.0));
+    f.number({"fy", "the same"}, lens.fy, Range::above(0.0));
+    f.number({"cx", "principal point, its pixels"}, lens.cx);
+    f.number({"cy", "the same"}, lens.cy);
+    f.numbers({"distortion", "k1 k2 p1 p2 k3"}, lens.distortion);
+    visit_pose(f, lens.camera_from_sample);
+  });
+}
+
+sim::BoardSceneOptions board_scene(const SimBoardConfig& board, const sim::RigOptions& rig) {
+  sim::BoardSceneOptions scene;
+  scene.board = board.board;
+  scene.projector = board.projector;
+  scene.projector.width = rig.projector.width;
+  scene.projector.height = rig.projector.height;
+  scene.reference_distance_mm = scene.focus_mm = board.distance_mm;
+  scene.poses = sim::held_poses(
+      scene.board, rig.camera.model, scene.projector, board.distance_mm, board.poses, board.seed);
+  const auto last = static_cast<std::int64_t>(scene.poses.size());
+  for (const std::int64_t pose : board.defocused) {
+    if (pose <= last) scene.poses[static_cast<std::size_t>(pose - 1)].defocus_px = kDefocus;
+  }
+  for (const std::int64_t pose : board.hidden) {
+    if (pose <= last) scene.poses[static_cast<std::size_t>(pose - 1)].hidden = kHidden;
+  }
+  return scene;
+}
+
+}  // namespace opaline::config
