@@ -17,7 +17,7 @@ namespace opaline::calibration {
 /// Which steps are done.
 struct ProcedureOptions {
   std::optional<std::string> only;  ///< one step; those before it must have been accepted
-  GeometryOptions geometry;         ///< without a board there is no such step
+  GeometryOptions geometry = {};    ///< without a board there is no such step
 };
 
 /// Keeps the record on disk after each step.
