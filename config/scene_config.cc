@@ -13,7 +13,7 @@ namespace {
 using namespace render;  // NOLINT(google-build-using-namespace): a file about its structs
 
 constexpr std::array<std::string_view, 2> kObjectKinds{"translucent", "opaque"};
-constexpr std::array<std::string_view, 3> kLightKinds{"directional", "point", "spot"};
+constexpr std::array<std::string_view, 4> kLightKinds{"directional", "point", "spot", "disc"};
 constexpr std::array<std::string_view, 3> kPatternKinds{"none", "veins", "layers"};
 constexpr std::array<std::string_view, 3> kTilings{"clamp", "repeat", "mirror"};
 constexpr std::array<std::string_view, 3> kSpeculars{"none", "cook_torrance", "ward"};
@@ -125,13 +125,19 @@ void visit_light(Fields& fields, LightOptions& l) {
     vector(fields, {"direction", "in which it shines", true}, l.direction, Unit::kPlain);
     fields.check(length(l.direction) > 0.0, "direction", "expected a vector that is not 0");
   }
-  Colour& strength = far ? l.irradiance : l.intensity;
-  const char* name = far ? "irradiance" : "intensity";
-  fields.numbers({name, far ? "on a surface across it, W/mm^2" : "W/sr", true},
-                 strength,
-                 Range::between(0, 1e12));
+  const bool disc = l.kind == LightOptions::Kind::kDisc;
+  Colour& strength = far ? l.irradiance : disc ? l.radiance : l.intensity;
+  const char* name = far ? "irradiance" : disc ? "radiance" : "intensity";
+  const char* unit = far    ? "on a surface across it, W/mm^2"
+                     : disc ? "to all sides before it, W/(mm^2 sr)"
+                            : "W/sr";
+  fields.numbers({name, unit, true}, strength, Range::between(0, 1e12));
   fields.check(std::ranges::max(strength) > 0.0, name, "expected light in some channel");
   if (l.kind == LightOptions::Kind::kSpot) visit_spot(fields, l);
+  if (disc) {
+    fields.length_mm({"radius", ""}, l.radius_mm, Range{.min = 1e-6, .max = kFarthest});
+    fields.whole({"samples", "points that stand for it"}, l.samples, Range::between(1, 256));
+  }
   fields.flag({"shadows", "whether objects hide it"}, l.shadows);
 }
 
@@ -320,8 +326,10 @@ Scene example() {
   scene.environment.radiance = {0.05, 0.05, 0.06};
   scene.lights = {{.name = "key"},
                   {.name = "lamp", .kind = LightOptions::Kind::kPoint},
-                  {.name = "beam", .kind = LightOptions::Kind::kSpot}};
+                  {.name = "beam", .kind = LightOptions::Kind::kSpot},
+                  {.name = "panel", .kind = LightOptions::Kind::kDisc}};
   scene.lights[1].position = scene.lights[2].position = {20.0, -30.0, 40.0};
+  scene.lights[3].position = {0.0, 0.0, 40.0};
   scene.lights[2].direction = {-2.0, 3.0, -4.0};
   ObjectOptions body;
   body.name = "body";

@@ -82,6 +82,14 @@ std::optional<ShadowView> shadow_view(const LightOptions& light,
   return perspective_view(light.position, normalized(way), kMargin * ball, near_mm, texels);
 }
 
+Colour strength_of(const LightOptions& light) {
+  if (light.kind == LightOptions::Kind::kDirectional) return light.irradiance;
+  if (light.kind != LightOptions::Kind::kDisc) return light.intensity;
+  Colour intensity = light.radiance;
+  for (double& value : intensity) value *= std::numbers::pi * light.radius_mm * light.radius_mm;
+  return intensity;
+}
+
 void add_object(const SceneRenderer::DrawnObject& object, RasterGeometry& geometry) {
   const Look& look = *object.look;
   const auto first = static_cast<std::int32_t>(geometry.vertices.size());
@@ -136,15 +144,18 @@ RasterLights raster_lights(const std::vector<LightOptions>& lights,
                            int texels) {
   RasterLights all;
   for (const LightOptions& light : lights) {
-    const bool far = light.kind == LightOptions::Kind::kDirectional;
     RasterLight made{};
     made.along = vec4(length(light.direction) > 0.0 ? normalized(light.direction) : Vec3{},
                       static_cast<double>(light.kind));
-    made.strength = vec4(far ? light.irradiance : light.intensity, 0.0);
+    made.strength = vec4(strength_of(light), 0.0);
     made.cone = {static_cast<float>(light.cone_degrees * kRadians),
                  static_cast<float>(light.blur_degrees * kRadians),
                  0.0F,
                  static_cast<float>(texels)};
+    if (light.kind == LightOptions::Kind::kDisc) {
+      all.left_out.push_back(fmt::format(
+          "size of {}: what it mirrors and its shadows are those of its middle", light.name));
+    }
     double map = -1.0;
     const auto view = light.shadows ? shadow_view(light, geometry, texels) : std::nullopt;
     if (view && all.maps.size() < kShadowMaps) {

@@ -14,8 +14,12 @@ struct LightSample {
 };
 
 /// Far away: the light's irradiance. Point: I / d^2. Spot: the same times a smoothstep of the angle from its axis, 1 within
-/// cone - blur and 0 beyond the cone.
+/// cone - blur and 0 beyond the cone. Disc: as if all of it were in its middle, I cos a / d^2 with I = pi r^2 L.
 LightSample sample(const LightOptions& light, Vec3 place);
+
+/// A light that is as large as it is, as lights that are not: a disc as `samples` small ones that share its area, spread evenly
+/// (equal areas, the golden angle); others as they are.
+std::vector<LightOptions> parts_of(const LightOptions& light);
 
 bool is_black(const Colour& colour);
 

@@ -90,12 +90,17 @@ Result<void> check_object(const ObjectOptions& object) {
 
 Result<void> check_light(const LightOptions& light) {
   const bool far = light.kind == LightOptions::Kind::kDirectional;
-  const Colour& strength = far ? light.irradiance : light.intensity;
-  const char* what = far ? "irradiance" : "intensity";
+  const bool disc = light.kind == LightOptions::Kind::kDisc;
+  const Colour& strength = far ? light.irradiance : disc ? light.radiance : light.intensity;
+  const char* what = far ? "irradiance" : disc ? "radiance" : "intensity";
   if (auto r = check_colour(strength, what, 0.0, 1e12); !r) return r;
   if (is_black(strength)) return invalid_argument(fmt::format("{}: expected light", what));
   if (light.kind != LightOptions::Kind::kPoint && !(length(light.direction) > 0.0)) {
     return invalid_argument("direction: expected a vector that is not 0");
+  }
+  if (disc && !(light.radius_mm > 0.0)) return invalid_argument("radius: expected more than 0 mm");
+  if (disc && (light.samples < 1 || light.samples > 256)) {
+    return invalid_argument(fmt::format("samples = {}; expected 1 to 256", light.samples));
   }
   if (light.kind != LightOptions::Kind::kSpot) return ok();
   if (!(light.cone_degrees > 0.0 && light.cone_degrees <= 90.0)) {

@@ -81,15 +81,19 @@ struct ObjectOptions {
 };
 
 struct LightOptions {
-  enum class Kind : std::uint8_t { kDirectional, kPoint, kSpot };
+  enum class Kind : std::uint8_t { kDirectional, kPoint, kSpot, kDisc };
   std::string name = "light";
   Kind kind = Kind::kDirectional;
-  Vec3 direction{0.0, 0.0, -1.0};    ///< in which it shines (directional, spot); any length > 0
-  Vec3 position{};                   ///< (point, spot)
+  Vec3 direction{0.0, 0.0, -1.0};  ///< in which it shines (directional, spot, disc); any length > 0
+  Vec3 position{};                 ///< (point, spot; a disc's middle)
   Colour irradiance{1.0, 1.0, 1.0};  ///< on a surface across the light, W/mm^2 (directional)
   Colour intensity{1e3, 1e3, 1e3};   ///< W/sr (point, spot)
   double cone_degrees = 20.0;        ///< between axis and rim (spot)
   double blur_degrees = 4.0;         ///< over which the rim fades, inwards (spot)
+  Colour radiance{
+      1.0, 1.0, 1.0};       ///< W/(mm^2 sr), the same in all directions on its bright side (disc)
+  double radius_mm = 10.0;  ///< (disc)
+  int samples = 16;         ///< points that stand for it, 1 to 256 (disc)
   bool shadows = true;
 };
 

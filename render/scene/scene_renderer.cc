@@ -299,15 +299,15 @@ Colour SceneRenderer::passed(const LightOptions& light,
 void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token stop) {
   const auto& places = body.body->subsurface().places();
   const double ior = looks_[body.object].ior;
-  std::vector<std::atomic<bool>> reaches(lights_.size());
+  std::vector<std::atomic<bool>> reaches(sources_.size());
   for_each(places.size(), team_, stop, [&](std::size_t i) {
-    for (std::size_t l = 0; l < lights_.size(); ++l) {
-      const Colour q = passed(lights_[l], sample(lights_[l], places[i].place), places[i], ior);
+    for (std::size_t l = 0; l < sources_.size(); ++l) {
+      const Colour q = passed(sources_[l], sample(sources_[l], places[i].place), places[i], ior);
       if (!is_black(q)) reaches[l] = true;
       for (int c = 0; c < 3; ++c) light.q[i][c] += static_cast<float>(q[c]);
     }
   });
-  for (std::size_t l = 0; l < lights_.size(); ++l) {
+  for (std::size_t l = 0; l < sources_.size(); ++l) {
     if (reaches[l]) light_reaches_[l] = true;
   }
 }
@@ -315,11 +315,11 @@ void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token st
 void SceneRenderer::send_beams(const Body& body, Entering& light, std::stop_token stop) {
   const auto& faces = body.body->subsurface().beams()->faces();
   const double ior = looks_[body.object].ior;
-  for (std::size_t l = 0; l < lights_.size(); ++l) {
+  for (std::size_t l = 0; l < sources_.size(); ++l) {
     std::vector<Beam> beams(faces.size());
     for_each(faces.size(), team_, stop, [&](std::size_t f) {
-      const LightSample from = sample(lights_[l], faces[f].middle.place);
-      const Colour q = passed(lights_[l], from, faces[f].middle, ior);
+      const LightSample from = sample(sources_[l], faces[f].middle.place);
+      const Colour q = passed(sources_[l], from, faces[f].middle, ior);
       if (is_black(q)) return;
       beams[f] = {static_cast<int>(f), refracted(from.towards, faces[f].middle.normal, ior), q};
       for (double& watts : beams[f].power) watts *= faces[f].area;
@@ -349,7 +349,11 @@ SceneRenderer::Entering SceneRenderer::entering(const Body& body, std::stop_toke
 
 Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::stop_token stop) {
   lights_ = lights;
-  light_reaches_.assign(lights.size(), false);
+  sources_.clear();
+  for (const LightOptions& light : lights) {
+    for (LightOptions& part : parts_of(light)) sources_.push_back(std::move(part));
+  }
+  light_reaches_.assign(sources_.size(), false);
   statistics_.light_seconds = statistics_.solve_seconds = 0.0;
   for (const Body& body : bodies_) {
     Entering light;
@@ -379,8 +383,12 @@ void SceneRenderer::leave_out(std::string what) {
 void SceneRenderer::leave_out_dark() {
   const bool only_bodies =
       std::ranges::none_of(opaque_, [](const Opaque& o) { return o.drawn != nullptr; });
-  for (std::size_t l = 0; l < lights_.size() && only_bodies; ++l) {
-    if (!light_reaches_[l]) leave_out(fmt::format("{}: it reaches no object", lights_[l].name));
+  for (const LightOptions& light : lights_) {
+    bool reaches = !only_bodies;
+    for (std::size_t k = 0; k < sources_.size(); ++k) {
+      reaches = reaches || (light_reaches_[k] && sources_[k].name == light.name);
+    }
+    if (!reaches) leave_out(fmt::format("{}: it reaches no object", light.name));
   }
   for (std::size_t o = 0; o < looks_.size(); ++o) {
     if (looks_[o].surface.specular != SpecularModel::kNone && looks_[o].ior == 1.0) {
@@ -393,7 +401,7 @@ void SceneRenderer::leave_out_dark() {
 Result<Image<float>> SceneRenderer::draw(const CameraModel& camera, std::stop_token stop) {
   statistics_.draw_seconds = 0.0;
   const Stopwatch watch(statistics_.draw_seconds);
-  const Painter painter(surfaces_, looks_, lights_, scene_.environment);
+  const Painter painter(surfaces_, looks_, sources_, scene_.environment);
   return painter.draw(camera, scene_.picture.samples_per_axis, team_, stop);
 }
 

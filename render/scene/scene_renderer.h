@@ -121,13 +121,14 @@ class SceneRenderer {
   Scene scene_;
   ThreadTeam& team_;
   std::vector<LightOptions> lights_;
+  std::vector<LightOptions> sources_;  // of all lights their parts
   std::vector<Body> bodies_;
   std::vector<Opaque> opaque_;  // by object
   std::vector<std::vector<float>>
       body_sky_;  // of each body's places: int (1 - R) mu dw, not hidden
   Surfaces surfaces_;
   std::vector<Look> looks_;
-  std::vector<bool> light_reaches_;
+  std::vector<bool> light_reaches_;  // by source
   SceneStatistics statistics_;
 };
 

@@ -1,6 +1,6 @@
 // What the raster pass knows of a scene (render/raster/raster_buffers.h has the same, std430); lengths in mm.
 struct Light {
-  vec4 along;      // in which it shines, of length 1; w: 0 directional, 1 point, 2 spot
+  vec4 along;      // in which it shines, of length 1; w: 0 directional, 1 point, 2 spot, 3 disc
   vec4 position;   // w: its shadow map, or -1
   vec4 strength;   // irradiance W/mm^2, or intensity W/sr
   vec4 cone;       // half angle and blur, radians; z: side of a shadow texel at distance 1 (directional: anywhere), w: texels a side

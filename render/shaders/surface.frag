@@ -82,6 +82,7 @@ vec3 sample_light(Light light, out vec3 towards, out float distance) {
     const float t = clamp((light.cone.x - angle) / max(light.cone.y, 1e-6), 0.0, 1.0);
     share = t * t * (3.0 - 2.0 * t);
   }
+  if (light.along.w == 3.0) share = max(0.0, -dot(light.along.xyz, towards));
   return light.strength.rgb * (share / (distance * distance));
 }
 

@@ -130,6 +130,7 @@ void ViewModel::scale_light(std::size_t light, double factor) {
   if (light >= lights_.size() || !(factor > 0.0)) return;
   for (double& value : lights_[light].irradiance) value *= factor;
   for (double& value : lights_[light].intensity) value *= factor;
+  for (double& value : lights_[light].radiance) value *= factor;
   changed();
 }
 

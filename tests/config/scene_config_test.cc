@@ -52,7 +52,7 @@ TEST(SceneConfig, ShowsItsKeysInTheExampleAndReadsThem) {
   EXPECT_EQ(read_text(config_file("scene.example.toml")).value(), scene_example());
   const auto scene = load_scene(config_file("scene.example.toml"));
   ASSERT_TRUE(scene) << scene.error().message;
-  EXPECT_EQ(scene->lights.size(), 3U);
+  EXPECT_EQ(scene->lights.size(), 4U);
   EXPECT_EQ(scene->objects.size(), 2U);
   EXPECT_EQ(scene->objects[1].kind, render::ObjectOptions::Kind::kOpaque);
 }

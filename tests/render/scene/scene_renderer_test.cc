@@ -133,6 +133,37 @@ TEST(SceneRenderer, ASphereInAnEnvironmentShowsTheExactRadiance) {
   EXPECT_LT(sphere_error(scene, {0.0, 0.0, 1.0}, [q](double) { return q; }), 0.01);
 }
 
+// A disc of radiance L before a plane across its axis: E = pi L r^2 / (r^2 + h^2) below its middle, and as a point far away.
+// 256 points of equal area leave an error of the order of 1 / 256.
+TEST(SceneRenderer, AMattePlaneUnderADiscShowsItsClosedForm) {
+  for (const double height : {4.0, 12.0, 60.0}) {
+    Scene scene = scene_of({floor_at(0.0, 60.0)});
+    LightOptions disc;
+    disc.kind = LightOptions::Kind::kDisc;
+    disc.position = {0.0, 0.0, height};
+    disc.direction = {0.0, 0.0, -2.0};
+    disc.radiance = {3.0, 2.0, 1.0};
+    disc.radius_mm = 6.0;
+    disc.samples = 256;
+    scene.lights = {disc};
+    scene.camera.position = {40.0, 20.0, 100.0};
+    const auto picture = drawn(scene);
+    ASSERT_TRUE(picture) << picture.error().message;
+    const double form = 36.0 / (36.0 + height * height);  // E / (pi L); times rho L is the radiance
+    EXPECT_NEAR(picture->at(48, 48, 1) / (0.4 * 2.0 * form), 1.0, 0.01) << height;
+  }
+}
+
+TEST(SceneRenderer, ADiscShinesOnOneSideOnly) {
+  LightOptions disc;
+  disc.kind = LightOptions::Kind::kDisc;
+  for (const LightOptions& part : parts_of(disc)) {
+    EXPECT_GT(sample(part, {1.0, 2.0, -5.0}).irradiance[0], 0.0);
+    EXPECT_EQ(sample(part, {1.0, 2.0, 5.0}).irradiance[0], 0.0);
+    EXPECT_LE(length(part.position), disc.radius_mm);
+  }
+}
+
 TEST(SceneRenderer, AMattePlaneUnderAPointLightFollowsLambert) {
   Scene scene = scene_of({floor_at(0.0, 60.0)});
   LightOptions lamp;
