@@ -33,8 +33,14 @@ def compiled_often(file):
     return 'foreach_target.h' in open(os.path.join(ROOT, file)).read()
 
 
+def checks_of(file):
+    """The top directory, where that has checks of its own; else nothing."""
+    top = file.split('/')[0]
+    return top if os.path.exists(os.path.join(ROOT, top, '.clang-tidy')) else ''
+
+
 def grouped(files):
-    kinds = {file: (file.startswith('tests/'), testing_means(file)) for file in files if not compiled_often(file)}
+    kinds = {file: (checks_of(file), testing_means(file)) for file in files if not compiled_often(file)}
     alike = [[file for file in kinds if kinds[file] == kind] for kind in sorted(set(kinds.values()))]
     alone = [[file] for file in files if file not in kinds]
     return alone + [group for some in alike for group in without_clashes(some)]
