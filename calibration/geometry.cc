@@ -41,7 +41,7 @@ std::array<int, 2> projector_size(const StepContext& context) {
 
 // Where in the picture the fewest corners are: "upper left".
 std::string emptiest_part(const StepContext& context, const Poses& poses) {
-  std::array<int, kFieldsAcross * kFieldsAcross> counts{};
+  std::array<int, std::size_t{kFieldsAcross} * kFieldsAcross> counts{};
   for (const BoardView& view : poses.camera) {
     for (const BoardCorner& corner : view.corners) {
       const auto field = [](double place, int size) {
