@@ -18,6 +18,7 @@
 
 #include "bench/calibrate/capture_time.h"
 #include "bench/calibrate/chart_colors.h"
+#include "bench/calibrate/geometry_case.h"
 #include "bench/figure.h"
 #include "calibration/response_fit.h"
 #include "capture/hdr_merge.h"
@@ -203,7 +204,7 @@ int run() {
   }
   print_figure("hdr.bias", "sim", most.bias, "1");
   print_figure("hdr.variance_over_crb", "sim", most.over_bound, "1");
-  return print_colors() && print_capture_time() ? 0 : 1;
+  return print_colors() && print_capture_time() && print_geometry() ? 0 : 1;
 }
 
 }  // namespace

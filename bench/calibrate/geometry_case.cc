@@ -1,0 +1,167 @@
+#include "bench/calibrate/geometry_case.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "base/clock.h"
+#include "bench/figure.h"
+#include "calibration/procedure.h"
+#include "sim/board_optics.h"
+#include "sim/rig.h"
+#include "sim/sim_camera.h"
+#include "sim/sim_projector.h"
+
+namespace opaline::bench {
+namespace {
+
+using calibration::Record;
+using calibration::RecordState;
+
+constexpr double kBoardSquare = 13.0;
+constexpr int kBoardColumns = 10;
+constexpr int kBoardRows = 7;
+constexpr double kBoardDistance = 350.0;
+constexpr double kOutOfFocus = 2.5;  // px
+constexpr double kCovered = 1.0 / 3.0;
+
+/// Remembers which poses were truly bad.
+class PoseWitness : public EventSink {
+ public:
+  explicit PoseWitness(const sim::BoardOptics& optics) : optics_(optics) {}
+  void progress(const Progress& /*p*/) override {}
+  Result<void> fact(std::string_view type, const nlohmann::json& data) override {
+    if (type != "pose.taken") return ok();
+    const sim::SimBoardPose held = optics_.held();
+    const std::string name = fmt::format("pose {}", data["pose"].get<int>());
+    if (held.defocus_px > 0.0 || held.hidden > 0.0) bad.insert(name);
+    fmt::print(stderr, "{}\n", data["message"].get<std::string>());
+    return ok();
+  }
+  std::set<std::string> bad;
+
+ private:
+  const sim::BoardOptics& optics_;
+};
+
+struct GeometryCase {
+  std::string name;
+  sim::RigOptions rig;
+  sim::BoardSceneOptions scene;
+  calibration::GeometryOptions geometry;
+};
+
+GeometryCase geometry_case(const std::string& name, int poses) {
+  GeometryCase c;
+  c.name = name;
+  c.rig.camera.model = sim::board_camera(640, 480);
+  c.scene.board = {.squares_x = kBoardColumns,
+                   .squares_y = kBoardRows,
+                   .square_mm = kBoardSquare,
+                   .margin_mm = 6.0};
+  c.scene.projector = sim::board_projector(c.rig.projector.width, c.rig.projector.height);
+  c.scene.poses = sim::held_poses(
+      c.scene.board, c.rig.camera.model, c.scene.projector, kBoardDistance, poses, 7);
+  c.geometry.board = {.squares_x = kBoardColumns,
+                      .squares_y = kBoardRows,
+                      .square_mm = kBoardSquare,
+                      .known_length_mm = (kBoardColumns - 2) * kBoardSquare};
+  c.geometry.poses = poses;
+  return c;
+}
+
+GeometryCase with_bad_poses(GeometryCase c) {
+  for (std::size_t i = 0; i < c.scene.poses.size(); i += 3) {
+    if (i % 2 == 0)
+      c.scene.poses[i].defocus_px = kOutOfFocus;
+    else
+      c.scene.poses[i].hidden = kCovered;
+  }
+  return c;
+}
+
+double focal_error(const CameraModel& is, const CameraModel& should) {
+  return std::max(std::abs(is.fx / should.fx - 1.0), std::abs(is.fy / should.fy - 1.0));
+}
+
+double principal_error(const CameraModel& is, const CameraModel& should) {
+  return std::hypot(is.cx - should.cx, is.cy - should.cy);
+}
+
+void print_geometry_figures(const GeometryCase& c,
+                            const Record& record,
+                            const PoseWitness& witness) {
+  const nlohmann::json& values = record.find(calibration::kGeometryStep)->values;
+  const auto print = [&](std::string_view figure, double value, std::string_view unit) {
+    print_figure(fmt::format("calibration.{}", figure), c.name, value, unit);
+  };
+  print("camera_rms_px", values["camera_rms_px"], "px");
+  print("projector_rms_px", values["projector_rms_px"], "px");
+  print("stereo_rms_px", values["stereo_rms_px"], "px");
+  print("length_error", std::abs(values["length_error"].get<double>()), "1");
+  const CameraModel& camera = record.measured.camera_lens->model;
+  const CameraModel& projector = record.measured.projector_lens->model;
+  print("camera_focal_error", focal_error(camera, c.rig.camera.model), "1");
+  print("projector_focal_error", focal_error(projector, c.scene.projector), "1");
+  print("camera_principal_point_error_px", principal_error(camera, c.rig.camera.model), "px");
+  print("projector_principal_point_error_px", principal_error(projector, c.scene.projector), "px");
+  print("projector_place_error_mm", length(projector.centre() - c.scene.projector.centre()), "mm");
+  double good_left_out = 0.0;
+  double bad_kept = 0.0;
+  for (const auto& pose : values["poses"]) {
+    const bool is_bad = witness.bad.contains(pose["name"].get<std::string>());
+    const bool is_left_out = !pose["left_out"].get<std::string>().empty();
+    good_left_out += is_left_out && !is_bad ? 1.0 : 0.0;
+    bad_kept += is_bad && !is_left_out ? 1.0 : 0.0;
+  }
+  print("bad_poses", static_cast<double>(witness.bad.size()), "1");
+  print("bad_poses_kept", bad_kept, "1");
+  print("good_poses_left_out", good_left_out, "1");
+}
+
+bool run_geometry(const GeometryCase& c) {
+  ManualClock clock;
+  const auto optics =
+      std::make_shared<const sim::BoardOptics>(c.rig.camera, c.rig.projector, c.scene);
+  const auto rig = sim::Rig::create(c.rig, optics, &clock);
+  if (!rig) {
+    fmt::print(stderr, "calibration: {}: {}\n", c.name, rig.error().message);
+    return false;
+  }
+  sim::SimCamera camera(**rig);
+  sim::SimProjector projector(**rig);
+  PoseWitness witness(*optics);
+  Record record;
+  record.version = 1;
+  const auto done = calibration::run_procedure(record,
+                                               {{}, c.geometry},
+                                               {},
+                                               {camera, projector, clock},
+                                               [](const Record&) { return ok(); },
+                                               witness,
+                                               {});
+  if (!done || record.state() != RecordState::kAccepted) {
+    fmt::print(stderr,
+               "calibration: {}: {}\n",
+               c.name,
+               done ? calibration::refusal(record.steps.back()) : done.error().message);
+    return false;
+  }
+  print_geometry_figures(c, record, witness);
+  return true;
+}
+
+}  // namespace
+
+bool print_geometry() {
+  const bool sharp = run_geometry(geometry_case("sim", 20));
+  return run_geometry(with_bad_poses(geometry_case("sim_defocused", 21))) && sharp;
+}
+
+}  // namespace opaline::bench
