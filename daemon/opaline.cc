@@ -39,6 +39,8 @@ struct CalibrateWish {
   std::string rig;
   std::string step;
   bool resume = false;
+  std::string view;
+  int frames = 0;
 };
 
 struct Arguments {
@@ -351,6 +353,8 @@ Error become_calibrate(const Arguments& arguments) {
   std::vector<std::string> words{"--calibrations", arguments.calibrations.root.string()};
   if (!wish.step.empty()) words.insert(words.end(), {"--step", wish.step});
   if (wish.resume) words.emplace_back("--resume");
+  if (!wish.view.empty())
+    words.insert(words.end(), {"--view", wish.view, "--frames", std::to_string(wish.frames)});
   words.insert(words.end(), {"--", wish.rig});
   return become(arguments.programs, "opaline-calibrate", words);
 }
@@ -366,9 +370,15 @@ void declare_calibrate(CLI::App& app, Arguments& arguments, int& status_code) {
   CLI::App* sub = app.add_subcommand(
       "calibrate", "Let a station measure its camera and projector before it measures a sample");
   sub->add_option("RIG", wish.rig, "rig.toml")->required();
-  sub->add_option(
-      "--step", wish.step, "One step only: warm_up, black_level, linearity, radiometric, check");
+  sub->add_option("--step",
+                  wish.step,
+                  "One step only: warm_up, black_level, linearity, radiometric, check; or colour");
   sub->add_flag("--resume", wish.resume, "Go on with the newest unfinished one");
+  auto* const view = sub->add_option(
+      "--view", wish.view, "A viewfinder instead: view.png and view.json in this directory");
+  sub->add_option("--frames", wish.frames, "With --view: end after so many; 0: Ctrl-C ends it")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(view);
   declare_place(*sub, arguments);
   sub->footer(
       "Each step has gates; the first that fails ends it and names what to mend. What is measured: "
@@ -376,7 +386,8 @@ void declare_calibrate(CLI::App& app, Arguments& arguments, int& status_code) {
       "station busy\n\nExamples:\n"
       "  opaline calibrate config/sim-rig.toml\n"
       "  opaline calibrate --resume config/sim-rig.toml\n"
-      "  opaline calibrate --step black_level config/sim-rig.toml");
+      "  opaline calibrate --step black_level config/sim-rig.toml\n"
+      "  opaline calibrate --view /tmp/view config/sim-rig.toml");
   sub->callback([&] { status_code = report(become_calibrate(arguments)); });
 }
 

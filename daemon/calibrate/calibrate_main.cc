@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <ranges>
 #include <string>
@@ -17,6 +18,7 @@
 #include "calibration/store.h"
 #include "config/session_config.h"
 #include "daemon/calibrate/calibration_report.h"
+#include "daemon/calibrate/view.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
 #include "daemon/driver_table.h"
@@ -39,6 +41,8 @@ struct Arguments {
   fs::path rig;
   std::string step;
   bool resume = false;
+  fs::path view;   ///< a viewfinder instead of a calibration
+  int frames = 0;  ///< of it; 0: until it is stopped
   fs::path calibrations = default_calibrations();
 };
 
@@ -109,15 +113,18 @@ Result<fs::path> make_place(const fs::path& directory,
   return directory;
 }
 
-Result<void> calibrate(Record& record,
-                       const Arguments& arguments,
-                       const config::RigConfig& rig,
-                       const Store& store,
-                       EventSink& events,
-                       const std::stop_token& asked) {
+using WithStation = std::function<Result<void>(const capture::Station&, std::stop_token)>;
+
+/// Opens the rig's devices, under a guardian, for what is to be done with them.
+Result<void> with_station(const Arguments& arguments,
+                          const config::RigConfig& rig,
+                          const fs::path& directory,
+                          EventSink& events,
+                          const std::stop_token& asked,
+                          const WithStation& work) {
   const auto text = read_text(arguments.rig);
   if (!text) return text.error();
-  const auto place = make_place(store.directory_of(record.version), rig, *text);
+  const auto place = make_place(directory, rig, *text);
   if (!place) return place.error();
   const auto devices = StationDevices::create(rig, *place, events, asked);
   if (!devices) return devices.error();
@@ -129,20 +136,67 @@ Result<void> calibrate(Record& record,
   const auto request = [&stop] { stop.request_stop(); };
   const std::stop_callback on_signal(asked, request);
   const std::stop_callback unguarded((*guardian)->death(), request);
+  auto done = work((*devices)->station(), stop.get_token());
+  if ((*guardian)->death().stop_requested())
+    return unavailable("the guardian died, and without one no light stays on");
+  return done;
+}
+
+Result<void> calibrate(Record& record,
+                       const Arguments& arguments,
+                       const config::RigConfig& rig,
+                       const Store& store,
+                       EventSink& events,
+                       const std::stop_token& asked) {
   calibration::ProcedureOptions options;
   if (!arguments.step.empty()) options.only = arguments.step;
   options.geometry = rig.geometry;
-  auto done = calibration::run_procedure(
-      record,
-      options,
-      rig.calibration,
-      (*devices)->station(),
-      [&](const Record& kept) { return store.write(kept); },
-      events,
-      stop.get_token());
-  if (!done && (*guardian)->death().stop_requested())
-    return unavailable("the guardian died, and without one no light stays on");
-  return done;
+  return with_station(arguments,
+                      rig,
+                      store.directory_of(record.version),
+                      events,
+                      asked,
+                      [&](const capture::Station& station, std::stop_token stop) {
+                        return calibration::run_procedure(
+                            record,
+                            options,
+                            rig.calibration,
+                            station,
+                            [&](const Record& kept) { return store.write(kept); },
+                            events,
+                            std::move(stop));
+                      });
+}
+
+/// Black and clipping as calibrated last, or as the rig file has them.
+Result<void> look(const Arguments& arguments, const config::RigConfig& rig, const Store& store) {
+  std::stop_source stop;
+  const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
+  if (!signals) return signals.error();
+  const auto active = store.read_active();
+  auto known = rig.calibration;
+  if (active && *active) known = calibration::with_measured(known, (*active)->measured);
+  const ViewOptions options{fs::absolute(arguments.view),
+                            arguments.frames,
+                            known.camera.black_level,
+                            capture::clipping_code(known.camera)};
+  fmt::print("{}\n", (options.directory / "view.png").string());
+  NullSink events;
+  const auto say = [](const std::string& line) {
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  const fs::path place = options.directory / ".station";  // of another rig, perhaps
+  std::error_code none;
+  fs::remove_all(place, none);
+  return with_station(arguments,
+                      rig,
+                      place,
+                      events,
+                      stop.get_token(),
+                      [&](const capture::Station& station, const std::stop_token& token) {
+                        return run_viewfinder(options, station, system_files(), events, say, token);
+                      });
 }
 
 /// What became of it, for people; an error where it was refused.
@@ -206,6 +260,7 @@ Result<void> run(const Arguments& arguments) {
   const auto lock = lock_station(rig->station);
   if (!lock) return lock.error();
   const Store store(system_files(), fs::absolute(arguments.calibrations), rig->station);
+  if (!arguments.view.empty()) return look(arguments, *rig, store);
   auto record = record_to_fill(store, arguments, rig->station);
   if (!record) return record.error();
   std::stop_source stop;
@@ -237,6 +292,11 @@ int program(int argc, char** argv) {
   app.add_flag("--resume", arguments.resume, "Go on with the newest unfinished one");
   app.add_option("--calibrations", arguments.calibrations, "Directory of all calibrations")
       ->capture_default_str();
+  auto* const view = app.add_option(
+      "--view", arguments.view, "A viewfinder instead: view.png and view.json in this directory");
+  app.add_option("--frames", arguments.frames, "With --view: end after so many; 0: Ctrl-C ends it")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(view);
   app.set_version_flag("--version", fmt::format("opaline-calibrate {}", version()));
   app.footer(
       "Ctrl-C stops; --resume goes on after the last step done.\nExit status: 0 done, 1 refused or "
@@ -244,6 +304,7 @@ int program(int argc, char** argv) {
       "  opaline-calibrate config/sim-rig.toml\n"
       "  opaline-calibrate --resume config/sim-rig.toml\n"
       "  opaline-calibrate --step black_level config/sim-rig.toml\n"
+      "  opaline-calibrate --view /tmp/view config/sim-rig.toml\n"
       "  opaline-calibrate --step colour config/sim-rig-chart.toml\n"
       "  opaline-calibrate config/sim-boards.toml");
   try {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <stop_token>
+#include <string>
+
+#include "base/events.h"
+#include "base/files.h"
+#include "base/result.h"
+#include "capture/station.h"
+
+namespace opaline::daemon {
+
+/// A viewfinder: pictures of what the camera sees under the projector's white, one after another until it is stopped, or `frames`
+/// of them have been taken (0: no end). After each, whole, in `directory`: view.png, and view.json with focus, the best focus so
+/// far, saturation, coverage and histograms; `say` hears one line.
+/// The exposure is the longest of whole turns, up to half a second, that fills at most 0.1 % of the samples; after that the light is dimmed.
+/// Errors: what the devices return; kCancelled is an end like any other.
+struct ViewOptions {
+  std::filesystem::path directory;
+  int frames = 0;
+  double black = 64.0;
+  double clipping = 4095.0;
+};
+Result<void> run_viewfinder(const ViewOptions& options,
+                            const capture::Station& station,
+                            FileOperations& files,
+                            EventSink& events,
+                            const std::function<void(const std::string&)>& say,
+                            const std::stop_token& stop);
+
+}  // namespace opaline::daemon
