@@ -207,10 +207,10 @@ void ChartOptics::look() {
     for (int x = 0; x < camera_.model.width; ++x) {
       std::array<int, kWall + 1> counts{};
       for (int s = 0; s < kSamples * kSamples; ++s) {
+        const int down = s / kSamples;
         const Eigen::Vector3d place =
-            to_chart * Eigen::Vector3d(x + (s % kSamples + 0.5) / kSamples,
-                                       y + (s / kSamples + 0.5) / kSamples,
-                                       1.0);
+            to_chart *
+            Eigen::Vector3d(x + (s % kSamples + 0.5) / kSamples, y + (down + 0.5) / kSamples, 1.0);
         ++counts[what_at(place[0] / place[2], place[1] / place[2], options_.patch_share)];
       }
       for (std::size_t what = 0; what < counts.size(); ++what) {

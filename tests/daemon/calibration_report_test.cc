@@ -6,7 +6,6 @@ namespace opaline::daemon {
 namespace {
 
 using calibration::Record;
-using calibration::StepRecord;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
