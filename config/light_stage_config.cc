@@ -108,6 +108,36 @@ void visit_light_stage(Fields& fields, LightStageConfig& stage) {
   fields.table({"udmx", "DMX over USB."}, [&](Fields& f) { visit_udmx(f, stage.udmx); });
 }
 
+namespace {
+
+constexpr std::array<std::string_view, 3> kMixtureNames{"none", "halves", "bands"};
+
+void visit_body(Fields& fields, sim::LedSphereOptions& sphere) {
+  fields.text({"body", "in place of the balls: ball | blob_a | blob_b | dent; of the only radius"},
+              sphere.body);
+  if (!sphere.body.empty()) {
+    fields.check(std::ranges::find(sim::kBodyNames, sphere.body) != sim::kBodyNames.end(),
+                 "body",
+                 "expected ball, blob_a, blob_b or dent, or nothing");
+    fields.check(sphere.radii_mm.size() == 1, "radii", "expected one, of the body");
+  }
+  fields.one_of({"mixture", "of a second material in the body"}, sphere.mixture, kMixtureNames);
+  fields.numbers({"second_reduced_albedo", "red, green, blue"},
+                 sphere.second_reduced_albedo,
+                 Range::between(0, 0.99999));
+  fields.numbers({"second_translucency", "red, green, blue"},
+                 sphere.second_translucency_mm,
+                 kAbove0,
+                 Unit::kLength);
+  fields.length_mm({"period", "of bands"}, sphere.period_mm);
+  fields.length_mm({"blur", "of the step between halves"}, sphere.blur_mm);
+  fields.whole({"paths_per_pixel", "of light, in a body and each channel"},
+               sphere.paths_per_pixel,
+               Range::between(16, 1e8));
+}
+
+}  // namespace
+
 void visit_sim_sphere(Fields& fields, sim::LedSphereOptions& sphere, double& drift_per_hour) {
   fields.quantities(
       {"radii", "of the balls, side by side"}, sphere.radii_mm, 0, Unit::kLength, kAbove0);
@@ -138,6 +168,7 @@ void visit_sim_sphere(Fields& fields, sim::LedSphereOptions& sphere, double& dri
   fields.whole({"seed", "of the paths and the lamps' errors"}, sphere.seed, Range::at_least(0));
   fields.whole(
       {"paths", "of light, in each ball and channel"}, sphere.paths, Range::between(10'000, 1e10));
+  visit_body(fields, sphere);
 }
 
 }  // namespace opaline::config

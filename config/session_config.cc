@@ -157,6 +157,8 @@ void visit_reconstruction(Fields& fields, SessionConfig& session) {
                 r.stalled,
                 Range::at_least(0));
   fields.whole({"checkpoint_every", "iterations"}, r.checkpoint_every, Range::between(1, 100000));
+  fields.path({"start", "a maps.exr, its session, or a material.vdb to start from; empty: a table"},
+              session.start);
   visit_reduction(fields, session.reduction);
   fields.flag({"uncertainty", "also find how well each cell is known"}, session.uncertainty);
   fields.one_of({"back_end", "what computes"}, r.back_end, kBackEndNames);

@@ -63,7 +63,8 @@ struct SessionConfig {
   capture::CaptureOptions capture;
   reconstruct::InverseOptions reconstruction;
   reconstruct::Reduction reduction;  ///< in [reconstruction], too
-  bool uncertainty = false;          ///< in [reconstruction]: whether the material's is found, too
+  std::filesystem::path start;  ///< in [reconstruction], too: maps.exr or material.vdb; none: empty
+  bool uncertainty = false;     ///< in [reconstruction]: whether the material's is found, too
   PreviewOptions preview;
 };
 

@@ -26,7 +26,7 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include "daemon/jobs/version.h"
 #include "sim/board_optics.h"
 #include "sim/color_chart.h"
-#include "sim/led_sphere.h"
+#include "sim/led_blob.h"
 #include "sim/rig_client.h"
 #include "sim/rig_message.h"
 #include "sim/transport_store.h"
@@ -187,11 +187,11 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
     options.projector.height = 1;
     options.projector.color_wheel = false;
     options.projector.wheel_turn = std::chrono::milliseconds(1);
-    auto balls =
-        sim::LedSphere::create(sim.balls, sim.lights, options.camera, events, std::move(stop));
-    if (!balls) return balls.error();
+    auto object =
+        sim::make_led_object(sim.balls, sim.lights, options.camera, events, std::move(stop));
+    if (!object) return object.error();
     return sim::Rig::create(
-        options, std::shared_ptr<const sim::LightPath>(*std::move(balls)), clock);
+        options, std::shared_ptr<const sim::LightPath>(*std::move(object)), clock);
   }
   if (sim.board.is_there()) return board_rig(sim.board, options, clock);
   if (sim.chart) {

@@ -180,6 +180,7 @@ Result<ChannelProblem> make_channel_problem(const Dataset& dataset,
                          .illuminations = {},
                          .data_count = 0,
                          .noise = 0.0};
+  if (options.start) problem.start = (*options.start)[static_cast<std::size_t>(channel)];
   for (const Illumination& illumination : dataset.illuminations) {
     if (!selected(illumination, selection)) continue;
     auto data = make_illumination(dataset, illumination, channel, options.model_error);

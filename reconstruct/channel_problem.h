@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/dataset.h"
@@ -32,6 +33,7 @@ struct ChannelProblem {
   std::vector<ChannelIllumination> illuminations;
   std::size_t data_count = 0;  ///< data of weight > 0
   double noise = 0.0;          ///< of all illuminations: the chi^2 that measured noise alone makes
+  std::optional<StartCoefficients> start = std::nullopt;  ///< InverseOptions::start
 };
 
 /// Which illuminations of a dataset a problem takes.

@@ -259,7 +259,10 @@ Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
                                        std::stop_token stop) {
   const ChannelProblem few = with_illuminations(problem, few_illuminations(problem, kFew));
   Fit sketch(few, options, solver, stop);
-  auto fit = sketched(sketch);
+  auto fit = problem.start
+                 ? sketch.from(sketch.bounded({std::log(problem.start->reduced_scattering),
+                                               std::log(problem.start->absorption)}))
+                 : sketched(sketch);
   if (!fit || options.max_iterations > 0) return fit;
   return refine_homogeneous(problem, options, *fit, solver, std::move(stop));
 }

@@ -29,7 +29,7 @@ struct HomogeneousFit {
 };
 
 /// Fits (log sigma_s', log sigma_a) of a homogeneous block by Levenberg-Marquardt with central
-/// differences, from the best of a coarse table of optical thicknesses and albedos. Two numbers
+/// differences, from ChannelProblem::start or the best of a coarse table of optical thicknesses and albedos. Two numbers
 /// need few pictures: four of the illuminations, spread over all of them, lead to the start of
 /// another fit; refine_homogeneous() has the last word where the homogeneous sample is the answer, as it is with
 /// max_iterations = 0. Absorption that the pictures cannot tell from none stays at its lower bound.

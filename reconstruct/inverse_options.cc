@@ -72,6 +72,11 @@ Result<void> validate(const InverseOptions& o) {
   if (o.structure == Structure::kShared && o.method == Method::kAsPublished)
     return invalid_argument(
         "structure = shared with method = as_published; expected another method, or separate");
+  if (o.start)
+    for (const StartCoefficients& s : *o.start)
+      if (!(s.reduced_scattering > 0.0 && s.absorption > 0.0))
+        return expected(
+            "start", std::min(s.reduced_scattering, s.absorption), "> 0 in every channel");
   if (!not_negative(o.direct_light_paths))
     return expected("direct_light_paths", o.direct_light_paths, ">= 0");
   if (!not_negative(o.model_error)) return expected("model_error", o.model_error, ">= 0");

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "base/dataset.h"
@@ -64,6 +66,12 @@ struct CoefficientBounds {
   double highest = 0.0;
 };
 
+/// A homogeneous material that is known beforehand, one channel, 1/mm; > 0.
+struct StartCoefficients {
+  double reduced_scattering = 1.0;
+  double absorption = 0.01;
+};
+
 /// How a dataset is inverted.
 struct InverseOptions {
   diffusion::SourceModel source = diffusion::SourceModel::kCollimated;
@@ -93,6 +101,8 @@ struct InverseOptions {
       0.01;  ///< stop when the objective falls by less than this fraction over ten iterations; >= 0
   CoefficientBounds absorption{1e-5, 10.0};
   CoefficientBounds reduced_scattering{0.02, 100.0};
+  /// Where the homogeneous fit starts, in place of the best of a table (reconstruct/homogeneous_fit.h).
+  std::optional<std::array<StartCoefficients, kColorChannels>> start;
   int checkpoint_every = 10;  ///< iterations; >= 1
   BackEnd back_end = BackEnd::kAuto;
   /// Whether host takes over when the device of back_end = "vulkan" is missing, full or lost; with "auto" it always does.

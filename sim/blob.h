@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "base/pose.h"
@@ -55,6 +57,7 @@ class Blob {
   double step_;       // least, mm
 };
 
+inline constexpr std::array<std::string_view, 4> kBodyNames{"ball", "blob_a", "blob_b", "dent"};
 /// Bodies that come with the program: "ball"; "blob_a", convex to the front with three bumps; "blob_b", with a saddle and a dent in front; "dent",
 /// a ball with one deep dent. Errors: kNotFound for another name.
 Result<BlobShape> blob_of_name(std::string_view name, double radius_mm);

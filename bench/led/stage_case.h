@@ -61,7 +61,7 @@ struct StageErrors {
   double error_90 = 0.0;      ///< |D over the truth - 1| that nine tenths of the answers keep to
   double scattering_error_90 = 0.0;  ///< the same of sigma_s'
   double seconds = 0.0;              ///< of computing
-  std::array<double, 8> reasons{};   ///< share of the pixels by LeftOut
+  std::array<double, 9> reasons{};   ///< share of the pixels by LeftOut
 };
 
 /// The lamp nearest to a direction.

@@ -10,6 +10,8 @@
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/version.h"
 #include "daemon/scattering/sphere_maps.h"
+#include "daemon/scattering/sphere_shell.h"
+#include "daemon/scattering/start_material.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/material_uncertainty.h"
 #include "reconstruct/summary.h"
@@ -103,14 +105,25 @@ Result<void> reconstruct_sphere(const config::SessionConfig& config, JobContext&
       find_maps(*session, config.led_sphere, config.reconstruction.threads, job.events, job.stop);
   if (!maps) return maps.error();
   if (auto written = write_maps(job.files, job.session, *maps); !written) return written;
+  if (auto written = write_shell(
+          job.files, job.session, *maps, *session, config.led_sphere.ior, config.sample_name);
+      !written) {
+    if (written.error().code != ErrorCode::kInvalidArgument) return written;
+    log::warning("no material.vdb: {}", written.error().message);
+  }
   const auto told = maps_summary(*maps, *session, config.led_sphere);
   return write_whole(job.files, job.session.reconstruction(), told.dump(2) + "\n");
 }
 
 Result<void> reconstruct_session(JobContext& job) {
-  const auto config = config::load_resolved(job.session);
+  auto config = config::load_resolved(job.session);
   if (!config) return config.error();
   if (config->kind == config::SessionKind::kLedSphere) return reconstruct_sphere(*config, job);
+  if (!config->start.empty()) {
+    const auto start = read_start(config->start);
+    if (!start) return start.error();
+    config->reconstruction.start = *start;
+  }
   const auto dataset = read_dataset(job.session.path());
   if (!dataset) return dataset.error().in("dataset");
   const auto back_end = reconstruct::make_back_end(config->reconstruction);

@@ -135,7 +135,7 @@ Result<void> write_maps(FileOperations& files,
   }
   ImageFile file{std::move(pixels), names, {}};
   for (const Layer& layer : kLayers) file.metadata[fmt::format("unit.{}", layer.name)] = layer.unit;
-  for (int reason = 0; reason <= static_cast<int>(LeftOut::kBeyondTable); ++reason)
+  for (int reason = 0; reason <= reconstruct::kLastReason; ++reason)
     file.metadata[fmt::format("left_out.{}", reason)] =
         std::string(reconstruct::to_string(static_cast<LeftOut>(reason)));
   const auto bytes = encode_image(file, ImageFormat::kExr);
@@ -144,7 +144,10 @@ Result<void> write_maps(FileOperations& files,
 }
 
 Result<SphereMaps> read_maps(const SessionDirectory& session) {
-  const std::filesystem::path path = session.path() / kFile;
+  return read_maps_file(session.path() / kFile);
+}
+
+Result<SphereMaps> read_maps_file(const std::filesystem::path& path) {
   const auto bytes = read_bytes(path, std::size_t{4} << 30);
   if (!bytes) return bytes.error();
   const auto file = decode_image(*bytes);
@@ -164,8 +167,8 @@ Result<SphereMaps> read_maps(const SessionDirectory& session) {
     for (const Layer& layer : kLayers)
       for (ScatteringMaps& channel : maps.channels) (channel.*layer.values).push_back(*from++);
     for (ScatteringMaps& channel : maps.channels) {
-      const int reason = std::clamp(
-          static_cast<int>(std::lround(*from++)), 0, static_cast<int>(LeftOut::kBeyondTable));
+      const int reason =
+          std::clamp(static_cast<int>(std::lround(*from++)), 0, reconstruct::kLastReason);
       channel.left_out.push_back(static_cast<LeftOut>(reason));
     }
     if (specular)
@@ -199,7 +202,7 @@ nlohmann::ordered_json maps_summary(const SphereMaps& maps,
     put("absorption_per_mm", m.absorption);
     put("diffusion_log_sd", m.log_diffusion_deviation);
     nlohmann::ordered_json reasons = nlohmann::ordered_json::object();
-    for (int reason = 0; reason <= static_cast<int>(LeftOut::kBeyondTable); ++reason) {
+    for (int reason = 0; reason <= reconstruct::kLastReason; ++reason) {
       std::size_t count = 0;
       for (std::size_t at = 0; at < m.left_out.size(); ++at)
         if (session.measured.samples()[at] != reconstruct::kNotSeen &&

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
@@ -42,6 +43,7 @@ Result<void> write_maps(FileOperations& files,
                         const SessionDirectory& session,
                         const SphereMaps& maps);
 Result<SphereMaps> read_maps(const SessionDirectory& session);
+Result<SphereMaps> read_maps_file(const std::filesystem::path& path);
 
 /// For reconstruction.json: medians of each channel, how many pixels were left out for which reason, what was assumed.
 nlohmann::ordered_json maps_summary(const SphereMaps& maps,

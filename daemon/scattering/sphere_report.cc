@@ -18,6 +18,7 @@
 #include "daemon/report/plot.h"
 #include "daemon/report/stage_times.h"
 #include "daemon/report/step_progress.h"
+#include "daemon/scattering/dipole_view.h"
 #include "daemon/scattering/sphere_maps.h"
 #include "daemon/scattering/sphere_truth.h"
 
@@ -27,7 +28,7 @@ namespace {
 using reconstruct::LeftOut;
 using reconstruct::ScatteringMaps;
 
-constexpr int kReasons = static_cast<int>(LeftOut::kBeyondTable) + 1;
+constexpr int kReasons = reconstruct::kLastReason + 1;
 constexpr std::array<const char*, 3> kColors{"#c0392b", "#1e8449", "#2471a3"};
 constexpr std::array<std::array<std::uint8_t, 3>, kReasons> kReasonColors{{{255, 255, 255},
                                                                            {40, 44, 50},
@@ -36,7 +37,8 @@ constexpr std::array<std::array<std::uint8_t, 3>, kReasons> kReasonColors{{{255,
                                                                            {150, 90, 40},
                                                                            {120, 190, 240},
                                                                            {240, 160, 60},
-                                                                           {200, 60, 60}}};
+                                                                           {200, 60, 60},
+                                                                           {120, 200, 90}}};
 
 /// A map's values over what is shown of it.
 struct View {
@@ -81,6 +83,7 @@ class SphereReport {
   void add_plot(const Result<std::string>& svg, std::string_view caption);
   void add_header(const SessionFacts& facts);
   void add_figures(const SessionFacts& facts);
+  Result<void> add_dipole();
   void add_truth();
   void add_reasons();
   void add_assumptions();
@@ -95,6 +98,7 @@ class SphereReport {
   SphereMaps maps_;
   nlohmann::json reconstruction_;
   std::optional<SphereTruth> truth_;
+  std::vector<std::pair<std::string, double>> dipole_errors_;
   const SystemClock clock_;
   std::vector<std::pair<std::string, std::vector<std::byte>>> pngs_;
   std::string body_;
@@ -264,6 +268,7 @@ void SphereReport::add_header(const SessionFacts& facts) {
       html::escaped(facts.begun.substr(0, 16)));
   for (const auto& [id, title] : {std::pair{"pictures", "Pictures"},
                                   {"maps", "Maps"},
+                                  {"dipole", "Rendered"},
                                   {"left-out", "Left out"},
                                   {"truth", "Truth"},
                                   {"assumptions", "Assumptions"},
@@ -303,6 +308,37 @@ void SphereReport::add_figures(const SessionFacts& facts) {
   body_ += "</div>\n";
 }
 
+/// What the maps make of the captured view, beside it.
+Result<void> SphereReport::add_dipole() {
+  const auto views = dipole_views(maps_, session_, config_.led_sphere.ior, job_.stop);
+  if (!views && views.error().code == ErrorCode::kCancelled) return views.error();
+  body_ += "<section id=\"dipole\">\n<h2>Rendered from the maps</h2>\n";
+  if (!views) {
+    body_ += html::warning(fmt::format("Not drawn: {}", views.error().message)) + "</section>\n";
+    return ok();
+  }
+  body_ += html::paragraph(
+      "On the left what the camera saw, on the right the same surface drawn from the maps: dipoles "
+      "summed over it (texture-space diffusion). The maps come from transport, so what differs is "
+      "what a dipole leaves out.");
+  for (const DipoleView& view : *views) {
+    const std::string name = "dipole_" + view.name;
+    const int times = std::max(1, 320 / std::max(1, view.captured.width()));
+    const Image<float> both = side_by_side(view, times);
+    if (auto written = write_png(name, tone_mapped(both, white_point(view.captured, 0.998)));
+        !written)
+      return written;
+    add_picture(name,
+                fmt::format("{}: {:.1f} % apart (relative RMS), {:.1f} % brighter in total",
+                            view.name,
+                            100.0 * view.error,
+                            100.0 * (view.scale - 1.0)));
+    dipole_errors_.emplace_back(view.name, view.error);
+  }
+  body_ += "</section>\n";
+  return ok();
+}
+
 void SphereReport::add_truth() {
   if (!truth_) return;
   std::vector<std::vector<std::string>> rows;
@@ -334,7 +370,7 @@ void SphereReport::add_reasons() {
   body_ += "<section id=\"left-out\">\n<h2>Left out, and why</h2>\n";
   add_picture("left_out", "Green: white has an answer, other colours as in the table.");
   static constexpr std::array<const char*, kReasons> kNames{
-      "white", "dark grey", "magenta", "blue", "brown", "light blue", "orange", "red"};
+      "white", "dark grey", "magenta", "blue", "brown", "light blue", "orange", "red", "green"};
   std::vector<std::vector<std::string>> rows;
   for (int reason = 0; reason < kReasons; ++reason) {
     std::vector<std::string> row{fmt::format("{} ({})",
@@ -381,6 +417,7 @@ nlohmann::ordered_json SphereReport::results(const SessionFacts& facts) const {
   json["session"] = job_.session.id();
   json["seconds"] = facts.stage_seconds;
   json["retaken"] = facts.regions_retaken;
+  for (const auto& [name, error] : dipole_errors_) json["dipole_error"][name] = error;
   if (!truth_) return json;
   auto balls = nlohmann::ordered_json::array();
   for (const BallErrors& ball : truth_->balls)
@@ -416,6 +453,7 @@ Result<void> SphereReport::run() {
     if (shown.name.starts_with("gradient")) add_picture(shown.name, shown.name);
   body_ += "</div>\n</section>\n";
   if (auto drawn = add_maps(); !drawn) return drawn;
+  if (auto drawn = add_dipole(); !drawn) return drawn;
   add_reasons();
   add_truth();
   add_assumptions();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/led_sphere.h"
+#include "sim/led_blob.h"
 
 namespace opaline::daemon {
 namespace {
@@ -25,14 +25,15 @@ SphereTruth compare_with_truth(const SphereMaps& maps,
                                const StageRecord& record,
                                const config::RigConfig& rig) {
   const sim::LedSphereOptions& options = rig.sim.balls;
-  const auto balls = sim::balls_of(options);
   SphereTruth truth;
-  std::vector<std::vector<double>> diffusion(3 * balls.size());
-  std::vector<std::vector<double>> albedo(3 * balls.size());
-  for (const sim::BallTruth& ball : balls)
+  const auto object = sim::LedTruth::create(options);
+  if (!object) return truth;  // such a rig does not start
+  std::vector<std::vector<double>> diffusion(3 * object->objects());
+  std::vector<std::vector<double>> albedo(3 * object->objects());
+  for (std::size_t b = 0; b < object->objects(); ++b)
     for (std::size_t c = 0; c < 3; ++c)
       truth.balls.push_back(
-          {.radius_mm = ball.radius_mm,
+          {.radius_mm = object->radius_mm(b),
            .channel = static_cast<int>(c),
            .diffusion_mm = sim::diffusion_of(options.reduced_albedo[c], options.translucency_mm[c]),
            .reduced_albedo = options.reduced_albedo[c]});
@@ -42,7 +43,7 @@ SphereTruth compare_with_truth(const SphereMaps& maps,
   for (int y = 0; y < measured.height(); ++y)
     for (int x = 0; x < measured.width(); ++x) {
       if (measured.at(x, y) != reconstruct::kMeasured) continue;
-      const auto seen = sim::see_ball(balls, rig.sim.rig.camera.model, x + 0.5, y + 0.5);
+      const auto seen = object->at(rig.sim.rig.camera.model, x + 0.5, y + 0.5);
       if (!seen) continue;
       double cosine = 0.0;
       for (std::size_t k = 0; k < 3; ++k)
@@ -52,14 +53,15 @@ SphereTruth compare_with_truth(const SphereMaps& maps,
       const std::size_t at = static_cast<std::size_t>(y) * measured.width() + x;
       for (std::size_t c = 0; c < 3; ++c) {
         const reconstruct::ScatteringMaps& m = maps.channels[c];
-        const std::size_t n = 3 * seen->ball + c;
+        const std::size_t n = 3 * seen->object + c;
         BallErrors& ball = truth.balls[n];
         ++ball.seen;
         if (m.left_out[at] != LeftOut::kFound) continue;
         ++ball.found;
-        diffusion[n].push_back(m.diffusion[at]);
-        albedo[n].push_back(m.reduced_albedo[at]);
-        const double off = std::abs(std::log(m.diffusion[at] / ball.diffusion_mm));
+        // relative to the place's own truth, where there are two materials
+        diffusion[n].push_back(m.diffusion[at] / seen->diffusion_mm[c] * ball.diffusion_mm);
+        albedo[n].push_back(m.reduced_albedo[at] / seen->reduced_albedo[c] * ball.reduced_albedo);
+        const double off = std::abs(std::log(m.diffusion[at] / seen->diffusion_mm[c]));
         if (off < 2.0 * m.log_diffusion_deviation[at]) ball.within_two_sigma += 1.0;
       }
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruct/spherical_gradient/shape_reach.h"
 #include "reconstruct/spherical_gradient/window_fit.h"
 
 namespace opaline::reconstruct {
@@ -345,6 +346,8 @@ std::string_view to_string(LeftOut reason) {
       return "too translucent for its curvature";
     case LeftOut::kBeyondTable:
       return "beyond the table";
+    case LeftOut::kInterreflection:
+      return "lit by a concave place";
   }
   return "unknown";
 }
@@ -380,6 +383,7 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
         estimate_pixel(window, pixel_mm, table, options, at, last, maps);
     }
   });
+  account_for_shape(pictures, team, maps);
   return maps;
 }
 

@@ -34,15 +34,17 @@ struct GradientPictures {
 
 /// Why a pixel has no answer.
 enum class LeftOut : std::uint8_t {
-  kFound,           ///< it has one
-  kNotMeasured,     ///< as the pictures say, or without light
-  kSaturated,       ///< in some picture
-  kTooFlat,         ///< its curvature is not certainly above zero
-  kConcave,         ///< its curvature is certainly below zero
-  kBelowNoise,      ///< its ratio is not certainly above that of a flat surface
-  kTooTranslucent,  ///< for its curvature
-  kBeyondTable,     ///< brighter or darker than what was traced
+  kFound,            ///< it has one
+  kNotMeasured,      ///< as the pictures say, or without light
+  kSaturated,        ///< in some picture
+  kTooFlat,          ///< its curvature is not certainly above zero
+  kConcave,          ///< its curvature is certainly below zero
+  kBelowNoise,       ///< its ratio is not certainly above that of a flat surface
+  kTooTranslucent,   ///< for its curvature
+  kBeyondTable,      ///< brighter or darker than what was traced
+  kInterreflection,  ///< a certainly concave place within 2 l_d lights it (shape_reach.h)
 };
+inline constexpr int kLastReason = static_cast<int>(LeftOut::kInterreflection);
 std::string_view to_string(LeftOut reason);  ///< "found", "not measured", "too flat", ...
 
 struct MapOptions {

@@ -50,6 +50,8 @@ TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
                            "led_sphere.toml",
                            "sim-rig-sphere.toml",
                            "sim-boards.toml",
+                           "led_blob.toml",
+                           "sim-rig-blob.toml",
                            "session.example.toml",
                            "rig.example.toml"}) {
     const auto problems = check(config_file(name));
