@@ -10,6 +10,7 @@
 
 #include "base/io/stage_record_io.h"
 #include "base/log.h"
+#include "capture/disk_space.h"
 #include "capture/frame_store.h"
 #include "capture/hdr_file.h"
 #include "capture/hdr_merge.h"
@@ -59,6 +60,7 @@ class GradientSequence {
   drivers::Pattern picture_of(const StageLight& light, std::uint64_t id) const;
   Result<RegionTaker*> taker(std::stop_token stop);
   Result<Frames> load(const std::string& name, const drivers::Pattern& pattern);
+  Result<void> check_space() const;
   Result<void> take_black(std::stop_token stop);
   void use_black(Frames frames);
   Result<void> find_dead_lamps(std::stop_token stop);
@@ -125,10 +127,25 @@ Result<RegionTaker*> GradientSequence::taker(std::stop_token stop) {
   auto made = RegionTaker::create(station_, {task_.options, task_.camera}, work_.events);
   if (!made) return made.error();
   taker_ = *std::move(made);
+  if (auto space = check_space(); !space) return space.error();
   if (!black_.cover(taker_->ladder())) {
     if (auto black = take_black(stop); !black) return black.error();
   }
   return taker_.get();
+}
+
+// Frames and pictures are counted at their size before compression.
+Result<void> GradientSequence::check_space() const {
+  constexpr std::uint64_t kRepeatsPlanned = 3;  // of a planned exposure, on average at most
+  constexpr std::uint64_t kSpareForLogs = 4U << 20U;
+  const bool repeats = task_.options.exposures.mode == ExposureMode::kPlanned;
+  const std::uint64_t frames =
+      taker_->ladder().size() * taker_->frame_bytes() * (repeats ? kRepeatsPlanned : 1);
+  const std::uint64_t picture = taker_->frame_bytes() / 6 * 8 * sizeof(float);
+  const auto missing = static_cast<std::uint64_t>(std::ranges::count_if(
+      patterns_, [&](const StageLight& light) { return !store_.has(light.name); }));
+  const std::uint64_t black = store_.has(kBlackName) ? 0 : frames;
+  return require_space(work_, missing * (frames + picture) + black + kSpareForLogs, missing);
 }
 
 Result<void> GradientSequence::take_black(std::stop_token stop) {

@@ -12,6 +12,7 @@
 #include "base/io/dataset_io.h"
 #include "base/log.h"
 #include "capture/dataset_builder.h"
+#include "capture/disk_space.h"
 #include "capture/exposure_planner.h"
 #include "capture/frame_store.h"
 #include "capture/hdr_file.h"
@@ -31,16 +32,6 @@ constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on av
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
 
 double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
-
-Result<std::uint64_t> free_on_disk(const fs::path& directory) {
-  std::error_code error;
-  const fs::space_info space = fs::space(directory, error);
-  if (error) {
-    return unavailable(
-        fmt::format("cannot tell the free space of {}: {}", directory.string(), error.message()));
-  }
-  return static_cast<std::uint64_t>(space.available);
-}
 
 double seconds_asked(std::span<const CapturedFrame> frames) {
   double sum = 0.0;
@@ -188,17 +179,7 @@ Result<void> Sequence::check_space() const {
   const std::uint64_t dataset = faces * 7 * sizeof(float) * patterns_.lights.size();
   const std::uint64_t black = store_.has(kBlackName) ? 0 : frames;
   const std::uint64_t needed = missing * (frames + picture) + black + dataset + kSpareBytes;
-  const auto free =
-      work_.free_bytes ? work_.free_bytes(work_.directory) : free_on_disk(work_.directory);
-  if (!free) return free.error();
-  if (*free >= needed) return ok();
-  return unavailable(
-      fmt::format("{} needs {} bytes for the {} lights still to take, and {} are free: make room "
-                  "and start again, nothing already captured is lost",
-                  work_.directory.string(),
-                  needed,
-                  missing,
-                  *free));
+  return require_space(work_, needed, missing);
 }
 
 Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,

@@ -15,13 +15,13 @@ namespace opaline::render {
 struct TexelSurface {
   int width = 0;
   int height = 0;
-  double texel_mm = 1.0;       ///< between neighbours, about: how far a kernel reaches in texels
-  std::vector<Vec3> position;  ///< mm
-  std::vector<Vec3> normal;    ///< unit
-  std::vector<float> area;     ///< mm^2
-  std::vector<std::uint8_t> covered;  ///< 0: no surface there
-  std::vector<float> reduced_albedo;  ///< alpha'
-  std::vector<float> diffusion;       ///< D, mm, > 0 where covered
+  double texel_mm = 1.0;  ///< between neighbours, about: how far a kernel reaches in texels
+  std::vector<Vec3> position = {};         ///< mm
+  std::vector<Vec3> normal = {};           ///< unit
+  std::vector<float> area = {};            ///< mm^2
+  std::vector<std::uint8_t> covered = {};  ///< 0: no surface there
+  std::vector<float> reduced_albedo = {};  ///< alpha'
+  std::vector<float> diffusion = {};       ///< D, mm, > 0 where covered
 };
 
 /// Light from all sides, L(omega) = constant + gradient . omega, W/(mm^2 sr).

@@ -38,10 +38,14 @@ class GradientSequenceTest : public ::testing::Test {
     sim::SimCamera camera(*rig);
     sim::SimLightStage stage(*rig, tiny_.lights);
     StageProjector projector(stage);
-    auto done = capture_gradients(task,
-                                  {camera, projector, clock_},
-                                  {directory_.path(), system_files(), events_},
-                                  std::move(stop));
+    auto done =
+        capture_gradients(task,
+                          {camera, projector, clock_},
+                          {directory_.path(),
+                           system_files(),
+                           events_,
+                           [this](const auto&) -> Result<std::uint64_t> { return free_bytes_; }},
+                          std::move(stop));
     EXPECT_FALSE(rig->status()->lamp_on);
     return done;
   }
@@ -50,6 +54,7 @@ class GradientSequenceTest : public ::testing::Test {
   TinySphere tiny_;
   std::shared_ptr<const sim::LightPath> traced_ = traced_once(tiny_);
   sim::Faults faults_;
+  std::uint64_t free_bytes_ = 1'000'000'000;
   ManualClock clock_;
   RecordingSink events_;
   testing::TemporaryDirectory directory_;
@@ -136,6 +141,15 @@ TEST_F(GradientSequenceTest, ALampThatDoesNotShineIsFoundAndDoneWithout) {
   ASSERT_TRUE(again);
   EXPECT_EQ(again->taken, 0);
   EXPECT_EQ(again->dead_lamps, done->dead_lamps);
+}
+
+TEST_F(GradientSequenceTest, AFullDiskIsSaidBeforeAnythingIsTaken) {
+  free_bytes_ = 5'000'000;
+  const auto done = capture(task());
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(done.error().message, HasSubstr("and 5000000 are free: make room"));
+  EXPECT_FALSE(std::filesystem::exists(directory_.path() / "frames" / "constant"));
 }
 
 TEST_F(GradientSequenceTest, NothingInTheMiddleIsSaid) {
