@@ -102,7 +102,7 @@ struct InverseOptions {
   CoefficientBounds absorption{1e-5, 10.0};
   CoefficientBounds reduced_scattering{0.02, 100.0};
   /// Where the homogeneous fit starts, in place of the best of a table (reconstruct/homogeneous_fit.h).
-  std::optional<std::array<StartCoefficients, kColorChannels>> start;
+  std::optional<std::array<StartCoefficients, kColorChannels>> start = {};
   int checkpoint_every = 10;  ///< iterations; >= 1
   BackEnd back_end = BackEnd::kAuto;
   /// Whether host takes over when the device of back_end = "vulkan" is missing, full or lost; with "auto" it always does.

@@ -168,11 +168,11 @@ TEST_F(Painting, ANewStrokeEndsWhatCouldBeRedone) {
 }
 
 TEST_F(Painting, TheHistoryForgetsTheOldestBeyondItsBound) {
-  const std::size_t stroke = 81 * (4 + 24);
+  constexpr std::size_t kStroke = 81 * std::size_t{4 + 24};
   MaterialEditor editor(
-      block_, {-10.0, -10.0, -10.0}, 1.0, [](Vec3) { return 0.0; }, 2 * stroke + 10);
+      block_, {-10.0, -10.0, -10.0}, 1.0, [](Vec3) { return 0.0; }, 2 * kStroke + 10);
   for (int k = 1; k <= 5; ++k) ASSERT_TRUE(editor.apply(hard(Operation::kSet, 0.1 * k)));
-  EXPECT_LE(editor.history().bytes(), 2 * stroke + 10);
+  EXPECT_LE(editor.history().bytes(), 2 * kStroke + 10);
   EXPECT_TRUE(editor.undo());
   EXPECT_TRUE(editor.undo());
   EXPECT_FALSE(editor.undo());
