@@ -205,7 +205,7 @@ TEST_F(ProcedureTest, DoesOneStepOnlyAfterThoseBeforeIt) {
   ASSERT_FALSE(early);
   EXPECT_EQ(early.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(early.error().message, HasSubstr("needs black_level"));
-  EXPECT_THAT(run("colour").error().message, HasSubstr("no step \"colour\"; there are warm_up"));
+  EXPECT_THAT(run("flavour").error().message, HasSubstr("no step \"flavour\"; there are warm_up"));
   ASSERT_TRUE(run("black_level"));
   EXPECT_EQ(record_.state(), RecordState::kIncomplete);
   ASSERT_TRUE(run());
