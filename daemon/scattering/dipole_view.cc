@@ -47,7 +47,7 @@ double leaving(double cosine, double ior) {
 
 /// The light of a pattern over that of the constant one; the picture it is compared with.
 struct Pattern {
-  const char* name;
+  const char* name = "";
   render::LinearLight light;
 };
 constexpr std::array<Pattern, 4> kPatterns{Pattern{"constant", {1.0, {}}},
