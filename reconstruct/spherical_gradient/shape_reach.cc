@@ -34,7 +34,7 @@ class CurvatureSums {
         }
         if (maps.left_out[at] == LeftOut::kConcave) row[3] += 1.0;
         for (std::size_t k = 0; k < row.size(); ++k)
-          at_(x + 1, y + 1)[k] = at_(x + 1, y)[k] + row[k];
+          sum_at(x + 1, y + 1)[k] = sum_at(x + 1, y)[k] + row[k];
       }
     }
   }
@@ -57,7 +57,7 @@ class CurvatureSums {
  private:
   using Sum = std::array<double, 4>;
   static std::size_t cells(int n) { return static_cast<std::size_t>(n); }
-  Sum& at_(int x, int y) { return sums_[cells(y) * cells(width_ + 1) + cells(x)]; }
+  Sum& sum_at(int x, int y) { return sums_[cells(y) * cells(width_ + 1) + cells(x)]; }
   const Sum& get(int x, int y) const { return sums_[cells(y) * cells(width_ + 1) + cells(x)]; }
 
   int width_;
