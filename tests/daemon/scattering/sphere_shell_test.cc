@@ -27,7 +27,7 @@ SphereMaps ball_maps(bool holes) {
   SphereMaps maps;
   for (auto& m : maps.channels) {
     m.width = m.height = kPixels;
-    const std::size_t count = kPixels * kPixels;
+    const std::size_t count = std::size_t{kPixels} * kPixels;
     for (auto* values : {&m.normal_x,
                          &m.normal_y,
                          &m.normal_z,
