@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/seconds.h"
 
 namespace opaline::calibration {
 namespace {
@@ -17,8 +18,6 @@ using std::chrono::nanoseconds;
 constexpr int kTries = 4;
 constexpr int kSettlePeriods = 2;
 constexpr nanoseconds kApart = std::chrono::microseconds(5);
-
-double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 bool can_retry(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kTimeout || code == ErrorCode::kBusy;

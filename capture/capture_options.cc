@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <string_view>
 
+#include "base/seconds.h"
+
 namespace opaline::capture {
 namespace {
 
@@ -14,10 +16,6 @@ struct Check {
   double value;
   std::string_view expected;
 };
-
-double seconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
 
 }  // namespace
 

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <utility>
 
+#include "base/seconds.h"
+
 namespace opaline::capture {
 namespace {
 
 using std::chrono::nanoseconds;
 
 constexpr double kExposureTolerance = 0.15;  // nominal 1/8 s for four thirtieths, as cameras round
-
-double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 bool uniform(const Image<std::uint16_t>& pixels) {
   const auto samples = pixels.samples();

@@ -10,6 +10,7 @@
 
 #include "base/io/stage_record_io.h"
 #include "base/log.h"
+#include "base/seconds.h"
 #include "capture/disk_space.h"
 #include "capture/frame_store.h"
 #include "capture/hdr_file.h"
@@ -28,8 +29,6 @@ using std::chrono::nanoseconds;
 constexpr const char* kBlackName = "black";
 constexpr const char* kLampFile = "lamps.json";
 constexpr double kHopelessDrift = 10.0;  // over the limit
-
-double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 /// The camera's directions along a row, down a column, and back towards itself.
 std::array<Vec3, 3> axes_of(const CameraModel& camera) {

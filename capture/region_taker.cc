@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/seconds.h"
 
 namespace opaline::capture {
 namespace {
@@ -15,8 +16,6 @@ using std::chrono::nanoseconds;
 
 constexpr nanoseconds kReplugPatience = std::chrono::seconds(10);
 constexpr nanoseconds kReplugPause = std::chrono::milliseconds(200);
-
-double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 constexpr double kDominates = 5.0;
 

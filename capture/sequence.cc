@@ -11,6 +11,7 @@
 #include "base/direct_light.h"
 #include "base/io/dataset_io.h"
 #include "base/log.h"
+#include "base/seconds.h"
 #include "capture/dataset_builder.h"
 #include "capture/disk_space.h"
 #include "capture/exposure_planner.h"
@@ -30,8 +31,6 @@ using std::chrono::nanoseconds;
 constexpr const char* kBlackName = "black";
 constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on average at most
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
-
-double seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 double seconds_asked(std::span<const CapturedFrame> frames) {
   double sum = 0.0;

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/seconds.h"
+
 namespace opaline::sim {
 namespace {
 
 constexpr std::size_t kRemembered = 256;
-
-double seconds(std::chrono::nanoseconds duration) {
-  return std::chrono::duration<double>(duration).count();
-}
 
 }  // namespace
 

@@ -4,14 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/seconds.h"
 #include "sim/options_check.h"
 
 namespace opaline::sim {
 namespace {
-
-double seconds(std::chrono::nanoseconds duration) {
-  return std::chrono::duration<double>(duration).count();
-}
 
 double polynomial(const std::array<double, 3>& v, double r2) {
   return 1.0 + r2 * (v[0] + r2 * (v[1] + r2 * v[2]));

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/log.h"
+#include "base/seconds.h"
 
 namespace opaline::sim {
 namespace {
@@ -22,8 +23,6 @@ constexpr double kUnwantedGamma = 2.2;
 constexpr double kFlickers = 0.03;
 constexpr double kFastTurn = 0.9;
 constexpr std::uint16_t kDriftedCodes = 24;
-
-double seconds(nanoseconds duration) { return std::chrono::duration<double>(duration).count(); }
 
 std::uint64_t content_hash(const Image<std::uint8_t>& codes) {
   std::uint64_t hash =

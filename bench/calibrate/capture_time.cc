@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "base/events.h"
+#include "base/seconds.h"
 #include "capture/exposure_planner.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
@@ -38,10 +39,6 @@ capture::StationCalibration believed(const sim::RigOptions& o) {
   c.camera.vignetting = {o.camera.vignetting};
   c.projector.vignetting = {o.projector.vignetting};
   return c;
-}
-
-double seconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
 }
 
 double exposed(const capture::TakenLight& light) {

@@ -13,6 +13,7 @@
 
 #include "base/files.h"
 #include "base/io/image_io.h"
+#include "base/seconds.h"
 #include "base/sha256.h"
 
 namespace opaline::drivers {
@@ -21,8 +22,6 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::size_t kFileLimit = std::size_t{1} << 30;
-
-double seconds(nanoseconds duration) { return std::chrono::duration<double>(duration).count(); }
 
 CameraInfo describe(const ReplayIndex& index, const std::filesystem::path& folder) {
   const auto [shortest, longest] = std::minmax_element(
