@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -14,6 +13,8 @@
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "tests/support/named_directory.h"
 
 namespace opaline {
 namespace {
@@ -93,7 +94,7 @@ struct Include {
   bool ours = false;  // "..." and not <...>
 };
 
-fs::path source_root() { return std::getenv("OPALINE_SOURCE_DIR"); }
+fs::path source_root() { return opaline::testing::named_directory("OPALINE_SOURCE_DIR"); }
 
 std::vector<Include> includes_of(const fs::path& path, const std::string& name) {
   static const std::regex pattern(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -11,6 +10,7 @@
 #include <sstream>
 #include <string>
 
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -71,7 +71,7 @@ const std::map<std::string, std::set<std::string>> kMayLink{
 };
 
 std::filesystem::path program(const std::string& name) {
-  return std::filesystem::path(std::getenv("OPALINE_BIN_DIR")) / name;
+  return opaline::testing::named_directory("OPALINE_BIN_DIR") / name;
 }
 
 /// What the program itself names (DT_NEEDED), without versions; what those libraries need is theirs.

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include "base/unix_socket.h"
 #include "config/session_config.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/raw_http.h"
 #include "tests/support/temporary_directory.h"
@@ -25,11 +25,11 @@ class OpalinedTest : public ::testing::Test {
   OpalinedTest() { std::filesystem::create_directories(switches_); }
 
   std::string program(const std::string& name) const {
-    return std::string(std::getenv("OPALINE_BIN_DIR")) + "/" + name;
+    return opaline::testing::named_directory("OPALINE_BIN_DIR").string() + "/" + name;
   }
-  std::string fakes() const { return std::getenv("OPALINE_FAKES"); }
+  std::string fakes() const { return opaline::testing::named_directory("OPALINE_FAKES").string(); }
   std::filesystem::path demo() const {
-    return std::filesystem::path(std::getenv("OPALINE_SOURCE_DIR")) / "config" / "sim.toml";
+    return opaline::testing::named_directory("OPALINE_SOURCE_DIR") / "config" / "sim.toml";
   }
   Process::Environment environment() const {
     return {{"OPALINE_SOCKET", socket_.string()},

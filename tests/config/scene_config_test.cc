@@ -2,9 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include <cstdlib>
-
 #include "base/files.h"
+#include "tests/support/named_directory.h"
 
 namespace opaline::config {
 namespace {
@@ -15,7 +14,7 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 fs::path config_file(const char* name) {
-  return fs::path(std::getenv("OPALINE_SOURCE_DIR")) / "config" / name;
+  return opaline::testing::named_directory("OPALINE_SOURCE_DIR") / "config" / name;
 }
 
 /// A small scene with some text replaced.

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include <cstdlib>
-
+#include "tests/support/named_directory.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::config {
@@ -18,7 +17,7 @@ using ::testing::SizeIs;
 using ::testing::StartsWith;
 
 fs::path config_file(const char* name) {
-  return fs::path(std::getenv("OPALINE_SOURCE_DIR")) / "config" / name;
+  return opaline::testing::named_directory("OPALINE_SOURCE_DIR") / "config" / name;
 }
 
 class SessionConfigTest : public ::testing::Test {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 
 #include "base/event_log.h"
@@ -11,6 +10,7 @@
 #include "base/session_directory.h"
 #include "calibration/store.h"
 #include "config/session_config.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -45,7 +45,8 @@ class CalibrateProgram : public ::testing::Test {
     std::string text;
   };
   std::unique_ptr<testing::Process> start(const char* program, std::vector<std::string> words) {
-    words.insert(words.begin(), (fs::path(std::getenv("OPALINE_BIN_DIR")) / program).string());
+    words.insert(words.begin(),
+                 (opaline::testing::named_directory("OPALINE_BIN_DIR") / program).string());
     return std::make_unique<testing::Process>(
         words,
         testing::Process::Environment{{"OPALINE_CALIBRATIONS", calibrations().string()},
@@ -82,7 +83,7 @@ class CalibrateProgram : public ::testing::Test {
     return text;
   }
   std::string config(const char* name) const { return (directory_.path() / name).string(); }
-  static fs::path source() { return std::getenv("OPALINE_SOURCE_DIR"); }
+  static fs::path source() { return opaline::testing::named_directory("OPALINE_SOURCE_DIR"); }
   void write(const char* name, const std::string& was, const std::string& is) {
     std::string text = read_text(source() / "config" / name).value();
     const auto found = text.find(was);

@@ -4,13 +4,13 @@
 
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <string>
 
 #include "base/event_log.h"
 #include "bench/faults/fault_bed.h"
 #include "sim/rig_client.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 
 namespace opaline::faults {
@@ -33,7 +33,8 @@ pid_t guardian_of(pid_t parent) {
 }
 
 TEST(CaptureAndItsGuardian, StopWithTheLampDarkWhenTheGuardianDies) {
-  auto bed = FaultBed::create({.programs = std::getenv("OPALINE_BIN_DIR"), .time_factor = 1});
+  auto bed = FaultBed::create(
+      {.programs = opaline::testing::named_directory("OPALINE_BIN_DIR"), .time_factor = 1});
   ASSERT_TRUE(bed) << bed.error().message;
   const auto session = (*bed)->new_session();
   ASSERT_TRUE(session);

@@ -11,6 +11,7 @@
 #include "base/lock.h"
 #include "daemon/jobs/control_client.h"
 #include "daemon/jobs/station_lock.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -29,7 +30,7 @@ class Job : public ::testing::Test {
   }
 
   std::string program() const {
-    return std::string(std::getenv("OPALINE_FAKES")) + "/opaline-capture";
+    return opaline::testing::named_directory("OPALINE_FAKES").string() + "/opaline-capture";
   }
   Process::Environment environment() const {
     return {{"OPALINE_FAKE_DIR", switches_.string()},

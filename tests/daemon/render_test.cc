@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "base/files.h"
 #include "base/io/image_io.h"
 #include "daemon/render/turntable.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -61,7 +61,7 @@ class RenderProgram : public ::testing::Test {
     return path("scene.toml").string();
   }
   testing::Process start(std::vector<std::string> arguments) {
-    const fs::path program = fs::path(std::getenv("OPALINE_BIN_DIR")) / "opaline";
+    const fs::path program = opaline::testing::named_directory("OPALINE_BIN_DIR") / "opaline";
     arguments.insert(arguments.begin(), {program.string(), "render"});
     return testing::Process(arguments, {}, path("out"));
   }

@@ -15,6 +15,7 @@
 #include "sim/rig_client.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_projector.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -60,8 +61,8 @@ class SimulatedRigTest : public ::testing::Test {
     return rig.value_or(config::RigConfig{});
   }
   RigProcess process_of(const config::RigConfig& rig) {
-    const char* programs = std::getenv("OPALINE_BIN_DIR");
-    return {.program = std::filesystem::path(programs != nullptr ? programs : ".") / "opaline-rig",
+    const auto programs = testing::named_directory("OPALINE_BIN_DIR");
+    return {.program = programs / "opaline-rig",
             .arguments = {"serve", "--config", rig_file_.string()},
             .socket = socket_,
             .identity = rig_identity(rig.sim),

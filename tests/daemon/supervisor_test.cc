@@ -11,6 +11,7 @@
 #include "daemon/cancel_wish.h"
 #include "daemon/jobs/control_client.h"
 #include "daemon/jobs/station_lock.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -70,7 +71,7 @@ class Supervision : public ::testing::Test {
 
   testing::TemporaryDirectory root_;
   std::filesystem::path switches_ = root_.path() / "switches";
-  LocalExecutor executor_{std::getenv("OPALINE_FAKES")};
+  LocalExecutor executor_{opaline::testing::named_directory("OPALINE_FAKES")};
   SystemClock clock_;
   std::chrono::nanoseconds terminate_after_ = 1min;
   std::chrono::nanoseconds kill_after_ = 2min;

@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 
 #include "base/files.h"
 #include "base/io/dataset_io.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/synthetic_dataset.h"
 #include "tests/support/temporary_directory.h"
@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 class TradeoffProgram : public ::testing::Test {
  protected:
   testing::Process start(std::vector<std::string> arguments) {
-    const fs::path program = fs::path(std::getenv("OPALINE_BIN_DIR")) / "opaline";
+    const fs::path program = opaline::testing::named_directory("OPALINE_BIN_DIR") / "opaline";
     std::vector<std::string> words{program.string(), "tradeoff"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     return testing::Process(words, {}, directory_.path() / "out");

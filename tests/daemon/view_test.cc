@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
-#include <cstdlib>
 #include <fstream>
 
 #include "base/files.h"
 #include "base/io/image_io.h"
 #include "base/io/volume_io.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -61,10 +61,11 @@ class Viewer : public ::testing::Test {
   std::string file(const char* name) const { return (directory_.path() / name).string(); }
 
   int view(std::vector<std::string> words, bool with_display = true) {
-    std::vector<std::string> command{std::string(std::getenv("OPALINE_BIN_DIR")) + "/opaline",
-                                     "view",
-                                     file("scene.toml"),
-                                     "--validation"};
+    std::vector<std::string> command{
+        opaline::testing::named_directory("OPALINE_BIN_DIR").string() + "/opaline",
+        "view",
+        file("scene.toml"),
+        "--validation"};
     command.insert(command.end(), words.begin(), words.end());
     const std::string shown = number();
     testing::Process viewer(

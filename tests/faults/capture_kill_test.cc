@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 
 #include "base/event_log.h"
 #include "bench/faults/fault_bed.h"
+#include "tests/support/named_directory.h"
 
 namespace opaline::faults {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr int kKills = 8;
 constexpr int kLights = 6;  // 2 x 2 regions and two held-out ones
 
-std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+std::filesystem::path programs() { return opaline::testing::named_directory("OPALINE_BIN_DIR"); }
 
 /// How often a light was taken to its end.
 std::ptrdiff_t captured(const std::filesystem::path& session) {

@@ -4,12 +4,12 @@
 
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 
 #include "base/event_log.h"
 #include "base/lock.h"
 #include "bench/faults/fault_bed.h"
 #include "sim/rig_client.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 
 namespace opaline::faults {
@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::eventually;
 
-std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+std::filesystem::path programs() { return opaline::testing::named_directory("OPALINE_BIN_DIR"); }
 
 /// A capture at work in real time, its lamp on.
 class GuardedCapture : public ::testing::Test {

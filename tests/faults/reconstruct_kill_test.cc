@@ -1,17 +1,17 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstdlib>
 
 #include "base/io/volume_io.h"
 #include "bench/faults/fault_bed.h"
+#include "tests/support/named_directory.h"
 
 namespace opaline::faults {
 namespace {
 
 constexpr int kKills = 3;
 
-std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+std::filesystem::path programs() { return opaline::testing::named_directory("OPALINE_BIN_DIR"); }
 
 // The files themselves differ in one place: OpenVDB gives each its own random name.
 TEST(KilledReconstruction, FindsTheVeryMaterialOfAnUndisturbedOne) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "base/io/volume_io.h"
 #include "base/session_directory.h"
 #include "bench/faults/fault_bed.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 
 namespace opaline::faults {
@@ -23,7 +23,7 @@ using testing::eventually;
 using ::testing::HasSubstr;
 using testing::Process;
 
-std::filesystem::path programs() { return std::getenv("OPALINE_BIN_DIR"); }
+std::filesystem::path programs() { return opaline::testing::named_directory("OPALINE_BIN_DIR"); }
 
 class WholeSession : public ::testing::Test {
  protected:

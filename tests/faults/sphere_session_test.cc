@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -11,6 +10,7 @@
 #include "base/session_directory.h"
 #include "config/session_config.h"
 #include "sim/rig_client.h"
+#include "tests/support/named_directory.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -77,7 +77,7 @@ class SphereSession : public ::testing::Test {
     ASSERT_TRUE(SessionDirectory::create(system_files(), session_, *contents));
   }
   std::unique_ptr<Process> start(const std::string& program) const {
-    const std::filesystem::path programs = std::getenv("OPALINE_BIN_DIR");
+    const std::filesystem::path programs = opaline::testing::named_directory("OPALINE_BIN_DIR");
     return std::make_unique<Process>(
         std::vector<std::string>{(programs / program).string(), session_.string()},
         Process::Environment{},

@@ -12,6 +12,7 @@
 #include "sim/light_transport.h"
 #include "sim/photon_lanes.h"
 #include "sim/scene.h"
+#include "tests/support/named_directory.h"
 
 // The committed responses of the demo's sample against the code as it is now.
 
@@ -19,8 +20,7 @@ namespace opaline::sim {
 namespace {
 
 std::filesystem::path demo_file() {
-  return std::filesystem::path(std::getenv("OPALINE_SOURCE_DIR")) /
-         "sim/data/demo_marble.transport";
+  return opaline::testing::named_directory("OPALINE_SOURCE_DIR") / "sim/data/demo_marble.transport";
 }
 
 ResponseOptions options_of(const TransportResponses& responses) {
