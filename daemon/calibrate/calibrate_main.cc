@@ -12,7 +12,6 @@
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/log.h"
 #include "base/session_directory.h"
 #include "calibration/procedure.h"
 #include "calibration/store.h"
@@ -22,6 +21,7 @@
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
 #include "daemon/driver_table.h"
+#include "daemon/jobs/command_program.h"
 #include "daemon/jobs/guardian.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/station_lock.h"
@@ -297,7 +297,6 @@ int program(int argc, char** argv) {
   app.add_option("--frames", arguments.frames, "With --view: end after so many; 0: Ctrl-C ends it")
       ->check(CLI::NonNegativeNumber)
       ->needs(view);
-  app.set_version_flag("--version", fmt::format("opaline-calibrate {}", version()));
   app.footer(
       "Ctrl-C stops; --resume goes on after the last step done.\nExit status: 0 done, 1 refused or "
       "failed, 2 bad input, 3 stopped, 4 station busy\n\nExamples:\n"
@@ -307,15 +306,7 @@ int program(int argc, char** argv) {
       "  opaline-calibrate --view /tmp/view config/sim-rig.toml\n"
       "  opaline-calibrate --step colour config/sim-rig-chart.toml\n"
       "  opaline-calibrate config/sim-boards.toml");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : status_of(ProgramExit::kBadInput);
-  }
-  log::set_level(log::Level::kWarning);
-  const auto done = run(arguments);
-  if (!done) fmt::print(stderr, "opaline-calibrate: {}\n", done.error().message);
-  return status_of(done);
+  return run_command(app, "opaline-calibrate", argc, argv, [&] { return run(arguments); });
 }
 
 }  // namespace

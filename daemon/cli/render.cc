@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/cli/successor.h"
+#include "daemon/cli/become.h"
 
 namespace opaline::daemon {
 
@@ -22,7 +22,7 @@ Error become_render(const std::filesystem::path& programs, const RenderWish& wis
   if (wish.at_rest) words.emplace_back("--at-rest");
   if (wish.swing) words.emplace_back("--swing");
   words.insert(words.end(), {"--", wish.scene});
-  return become(programs / "opaline-render", std::move(words));
+  return become(programs, "opaline-render", words);
 }
 
 }  // namespace opaline::daemon

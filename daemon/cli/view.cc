@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/cli/successor.h"
+#include "daemon/cli/become.h"
 
 namespace opaline::daemon {
 
@@ -20,7 +20,7 @@ Error become_view(const std::filesystem::path& programs, const ViewWish& wish) {
   if (!wish.device.empty()) words.insert(words.end(), {"--device", wish.device});
   if (wish.validation) words.emplace_back("--validation");
   words.insert(words.end(), {"--", wish.scene});
-  return become(programs / "opaline-view", std::move(words));
+  return become(programs, "opaline-view", words);
 }
 
 }  // namespace opaline::daemon

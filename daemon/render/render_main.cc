@@ -13,10 +13,10 @@
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/log.h"
 #include "config/scene_config.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
+#include "daemon/jobs/command_program.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
@@ -244,7 +244,6 @@ int program(int argc, char** argv) {
                arguments.swing,
                "Over a turntable objects bend from rest to where the scene has them, and back");
   app.add_option("--threads", arguments.threads, "0: one a processor")->check(CLI::Range(0, 1024));
-  app.set_version_flag("--version", fmt::format("opaline-render {}", version()));
   app.footer(
       "Ctrl-C stops; a picture is there whole or not at all.\n"
       "Exit status: 0 done, 1 failed, 2 bad scene, 3 stopped\n\nExamples:\n"
@@ -252,15 +251,7 @@ int program(int argc, char** argv) {
       "  opaline-render scene.toml --output frame.png --output frame.exr --turntable 60\n"
       "  opaline-render scene.toml --output bend.png --turntable 24 --swing\n"
       "  opaline-render scene.toml --output after.png --save-material ring=painted.vdb");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : status_of(ProgramExit::kBadInput);
-  }
-  log::set_level(log::Level::kWarning);
-  const auto done = run(arguments);
-  if (!done) fmt::print(stderr, "opaline-render: {}\n", done.error().message);
-  return status_of(done);
+  return run_command(app, "opaline-render", argc, argv, [&] { return run(arguments); });
 }
 
 }  // namespace

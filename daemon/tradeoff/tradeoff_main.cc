@@ -9,12 +9,11 @@
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/log.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
+#include "daemon/jobs/command_program.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
-#include "daemon/jobs/version.h"
 #include "daemon/tradeoff/measured_dataset.h"
 #include "daemon/tradeoff/tradeoff_plot.h"
 #include "reconstruct/tradeoff.h"
@@ -140,20 +139,11 @@ int program(int argc, char** argv) {
   app.add_option("--limit", arguments.limit_seconds, "Seconds after which a setting is given up")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.set_version_flag("--version", fmt::format("opaline-tradeoff {}", version()));
   app.footer(
       "Ctrl-C stops and keeps what was measured.\n\nExamples:\n"
       "  opaline-tradeoff ~/sessions/20260131-123456-ab12cd-marble\n"
       "  opaline-tradeoff --quick --out /tmp/front ~/sessions/20260131-123456-ab12cd-marble");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : status_of(ProgramExit::kBadInput);
-  }
-  log::set_level(log::Level::kWarning);
-  const auto done = run(arguments);
-  if (!done) fmt::print(stderr, "opaline-tradeoff: {}\n", done.error().message);
-  return status_of(done);
+  return run_command(app, "opaline-tradeoff", argc, argv, [&] { return run(arguments); });
 }
 
 }  // namespace

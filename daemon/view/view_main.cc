@@ -13,6 +13,7 @@
 #include "base/io/image_io.h"
 #include "base/log.h"
 #include "config/scene_config.h"
+#include "daemon/jobs/command_program.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
@@ -280,7 +281,6 @@ int program(int argc, char** argv) {
   app.add_flag(
       "--validation", arguments.validation, "Vulkan's validation layer; what it says fails");
   app.add_option("--threads", arguments.threads, "0: one a processor")->check(CLI::Range(0, 1024));
-  app.set_version_flag("--version", fmt::format("opaline-view {}", version()));
   app.footer(
       "Left button: turn, or paint; right: move; wheel: nearer; Shift and left: turn the light.\n"
       "--do: orbit RIGHT UP | zoom F | pan R U | light N RIGHT UP | exposure STOPS | paint X Y | "
@@ -293,15 +293,7 @@ int program(int argc, char** argv) {
       "  opaline-view scene.toml --do 'brush radius 2' --do 'paint 0.5 0.6' --do 'screenshot "
       "a.png'\n"
       "  opaline-view scene.toml --frames 5 --screenshot window.png");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : status_of(ProgramExit::kBadInput);
-  }
-  log::set_level(log::Level::kWarning);
-  const auto done = run(arguments);
-  if (!done) fmt::print(stderr, "opaline-view: {}\n", done.error().message);
-  return status_of(done);
+  return run_command(app, "opaline-view", argc, argv, [&] { return run(arguments); });
 }
 
 }  // namespace
