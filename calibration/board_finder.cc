@@ -11,6 +11,8 @@
 #include <optional>
 #include <vector>
 
+#include "calibration/corner_model.h"
+
 namespace opaline::calibration {
 namespace {
 
@@ -22,6 +24,9 @@ constexpr double kWindowShare = 0.3;  // of the corners' distance
 constexpr double kClear = 0.9;        // of the paper between a square's edge and its marker
 constexpr double kClearOfBlur = 0.5;
 constexpr int kLargestWindow = 11;
+constexpr double kDiscShare = 0.45;    // of the corners' distance
+constexpr double kSmallestDisc = 3.0;  // px
+constexpr double kLargestDisc = 14.0;
 constexpr int kFewestCorners = 8;
 constexpr double kProfileShare = 0.45;
 constexpr double kProfileStep = 0.25;
@@ -99,6 +104,41 @@ void refine(const cv::Mat& picture, double clear, Points& points) {
                    {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, kRefineSteps, kRefined});
 }
 
+// The direction from one neighbour to the other, or to the corner itself where it is the last.
+std::optional<double> edge_angle(const Found& found, std::size_t corner, int before, int after) {
+  const auto at = [&](int id) {
+    const auto there = std::ranges::find(found.ids, id);
+    return there == found.ids.end()
+               ? found.points[corner]
+               : found.points[static_cast<std::size_t>(there - found.ids.begin())];
+  };
+  const cv::Point2f along = at(after) - at(before);
+  if (cv::norm(along) < 1.0) return std::nullopt;
+  return std::atan2(along.y, along.x);
+}
+
+// Where the picture holds what corner_model.h says of corners, by that.
+void model_corners(const Image<std::uint8_t>& grey,
+                   const Board& board,
+                   double radius,
+                   double blur_px,
+                   Found& found) {
+  const Found before = found;
+  for (std::size_t i = 0; i < found.ids.size(); ++i) {
+    const int id = found.ids[i];
+    const int column = id % board.columns();
+    const auto along =
+        edge_angle(before, i, column > 0 ? id - 1 : id, column + 1 < board.columns() ? id + 1 : id);
+    const auto across = edge_angle(before, i, id - board.columns(), id + board.columns());
+    if (!along || !across) continue;
+    const CameraModel::Pixel place{found.points[i].x + 0.5, found.points[i].y + 0.5};
+    const auto corner = fit_corner(grey, {place, *along, *across, blur_px}, radius);
+    if (!corner) continue;
+    found.points[i] = {static_cast<float>(corner->place.x - 0.5),
+                       static_cast<float>(corner->place.y - 0.5)};
+  }
+}
+
 double sample(const cv::Mat& picture, double x, double y) {
   const int i = std::clamp(static_cast<int>(std::floor(x)), 0, picture.cols - 2);
   const int j = std::clamp(static_cast<int>(std::floor(y)), 0, picture.rows - 2);
@@ -174,7 +214,9 @@ void measure_edges(const cv::Mat& picture,
   view.contrast = median(contrasts);
 }
 
-BoardView view_of(const cv::Mat& picture, const Board& board, const std::string& name) {
+BoardView view_of(const Image<std::uint8_t>& grey, const Board& board, const std::string& name) {
+  cv::Mat picture(grey.height(), grey.width(), CV_8UC1);
+  std::ranges::copy(grey.samples(), picture.begin<std::uint8_t>());
   BoardView view;
   view.name = name;
   const bool is_charuco = board.kind == Board::Kind::kCharuco;
@@ -186,6 +228,9 @@ BoardView view_of(const cv::Mat& picture, const Board& board, const std::string&
   const double spacing = spacing_of(*found, board);
   refine(picture, clear_of(board, kWindowShare, kClear) * spacing, found->points);
   measure_edges(picture, board, *found, view);
+  const double disc =
+      std::clamp(clear_of(board, kDiscShare, kClear) * spacing, kSmallestDisc, kLargestDisc);
+  model_corners(grey, board, disc, view.blur_px, *found);
   for (std::size_t i = 0; i < found->ids.size(); ++i)
     view.corners.push_back({found->ids[i], {found->points[i].x + 0.5, found->points[i].y + 0.5}});
   if (static_cast<int>(found->ids.size()) < kFewestCorners)
@@ -232,10 +277,8 @@ Result<BoardView> find_board(const Image<std::uint8_t>& grey,
   if (auto good = validate(board); !good) return good.error();
   if (grey.empty() || grey.channels() != 1)
     return invalid_argument(fmt::format("{}: a grey picture was expected", name));
-  cv::Mat picture(grey.height(), grey.width(), CV_8UC1);
-  std::ranges::copy(grey.samples(), picture.begin<std::uint8_t>());
   try {
-    return view_of(picture, board, name);
+    return view_of(grey, board, name);
   } catch (const cv::Exception& e) {
     return internal_error(fmt::format("{}: OpenCV: {}", name, e.what()));
   }

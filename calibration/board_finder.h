@@ -14,7 +14,7 @@ namespace opaline::calibration {
 /// A chessboard is found whole or not at all, by growing it from its corners (OpenCV's findChessboardCornersSB; Duda & Frese
 /// 2018), or where that fails by its squares. A ChArUco board is found by its markers, also where part of it is hidden.
 /// Corners are then refined where the gradients of the picture around them are perpendicular to the lines from them (OpenCV's
-/// cornerSubPix, Foerstner & Guelch 1987). The blur of its edges is the second moment of their profiles' slopes.
+/// cornerSubPix, Foerstner & Guelch 1987), and from there placed by a model of their edges (corner_model.h) where that holds. The blur of its edges is the second moment of their profiles' slopes.
 ///
 /// Shapes: one channel. Threads: any. Errors: kInvalidArgument for a board or picture that makes no sense. Not to find the
 /// board is an answer: BoardView::fault says so.

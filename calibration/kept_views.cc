@@ -123,14 +123,14 @@ std::vector<double> typical_rms(const Kept& kept, const BundleSummary& summary, 
 int drop_outliers(
     const Kept& kept, const BundleSummary& summary, int lens, double outlier, Counts& counts) {
   if (outlier <= 0.0) return 0;
-  std::vector<double> distances;
-  for (std::size_t i = 0; i < summary.distance_px.size(); ++i) {
-    if (kept.bundle.sightings[i].lens == lens) distances.push_back(summary.distance_px[i]);
-  }
-  const double limit = outlier * std::max(kLeastSigma, median_of(distances) / kMedianOfRayleigh);
+  const std::vector<double> of_views = typical_rms(kept, summary, lens);
+  const double typical = median_of(of_views);
   int dropped = 0;
   for (std::size_t i = 0; i < summary.distance_px.size(); ++i) {
-    if (kept.bundle.sightings[i].lens != lens || summary.distance_px[i] <= limit) continue;
+    const Sighting& s = kept.bundle.sightings[i];
+    const double rms = std::max(typical, of_views[static_cast<std::size_t>(s.view)]);
+    const double limit = outlier * std::max(kLeastSigma, rms / std::numbers::sqrt2);
+    if (s.lens != lens || summary.distance_px[i] <= limit) continue;
     counts[kept.corner[i][0]][kept.corner[i][1]] = false;
     ++dropped;
   }

@@ -46,7 +46,7 @@ Kept kept_of(const CameraModel& lens,
 bool leave_out(std::vector<ViewFit>& views, const LensFitOptions& options, const char* what);
 /// What the RMS of each of the bundle's views would be without the corners that are far off: from the median of their distances.
 std::vector<double> typical_rms(const Kept& kept, const BundleSummary& summary, int lens);
-/// Corners far off what the others scatter; how many.
+/// Corners far off what the others of their view scatter, or of most views where that is more; how many.
 int drop_outliers(
     const Kept& kept, const BundleSummary& summary, int lens, double outlier, Counts& counts);
 /// With a scatter of 1 px, and again with the one that this leaves.

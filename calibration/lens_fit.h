@@ -18,8 +18,8 @@ struct LensFitOptions {
   double faint = 0.4;       ///< less than so much of most views' contrast
   double worst_view = 2.5;  ///< reprojection RMS over most views', and 0.05 px
   double disagree =
-      1.6;  ///< reprojection RMS of both lenses together over that of each alone, and 0.01 px
-  double outlier = 4.5;  ///< a corner so many standard deviations off; 0: all count
+      1.6;  ///< reprojection RMS of both lenses together over that of each alone, and 0.03 px
+  double outlier = 4.5;  ///< a corner so many of its view's standard deviations off; 0: all count
   int fewest_views = 5;
 };
 

@@ -14,7 +14,7 @@ namespace opaline::calibration {
 namespace {
 
 constexpr int kPairRounds = 10;
-constexpr double kDisagreeFloor = 0.01;  // px
+constexpr double kDisagreeFloor = 0.03;  // px
 
 Vec3 turn_of(const Pose& pose) {  // its axis times twice the sine of half its angle, roughly
   const auto& r = pose.rotation;
