@@ -204,7 +204,7 @@ int run() {
   }
   print_figure("hdr.bias", "sim", most.bias, "1");
   print_figure("hdr.variance_over_crb", "sim", most.over_bound, "1");
-  return print_colors() && print_capture_time() && print_geometry() ? 0 : 1;
+  return print_colors() && print_capture_time() && print_geometry(1) ? 0 : 1;
 }
 
 }  // namespace

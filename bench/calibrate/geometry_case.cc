@@ -6,9 +6,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/clock.h"
 #include "bench/figure.h"
@@ -28,6 +32,7 @@ constexpr double kBoardSquare = 13.0;
 constexpr int kBoardColumns = 10;
 constexpr int kBoardRows = 7;
 constexpr double kBoardDistance = 350.0;
+constexpr std::uint64_t kPoseSeed = 7;
 constexpr double kOutOfFocus = 2.5;  // px
 constexpr double kCovered = 1.0 / 3.0;
 
@@ -57,17 +62,23 @@ struct GeometryCase {
   calibration::GeometryOptions geometry;
 };
 
-GeometryCase geometry_case(const std::string& name, int poses) {
+// Noise and poses are the run's own.
+GeometryCase geometry_case(const std::string& name, int poses, int run) {
   GeometryCase c;
   c.name = name;
+  c.rig.seed = 1 + static_cast<std::uint64_t>(run);
   c.rig.camera.model = sim::board_camera(640, 480);
   c.scene.board = {.squares_x = kBoardColumns,
                    .squares_y = kBoardRows,
                    .square_mm = kBoardSquare,
                    .margin_mm = 6.0};
   c.scene.projector = sim::board_projector(c.rig.projector.width, c.rig.projector.height);
-  c.scene.poses = sim::held_poses(
-      c.scene.board, c.rig.camera.model, c.scene.projector, kBoardDistance, poses, 7);
+  c.scene.poses = sim::held_poses(c.scene.board,
+                                  c.rig.camera.model,
+                                  c.scene.projector,
+                                  kBoardDistance,
+                                  poses,
+                                  kPoseSeed + static_cast<std::uint64_t>(run));
   c.geometry.board = {.squares_x = kBoardColumns,
                       .squares_y = kBoardRows,
                       .square_mm = kBoardSquare,
@@ -94,24 +105,18 @@ double principal_error(const CameraModel& is, const CameraModel& should) {
   return std::hypot(is.cx - should.cx, is.cy - should.cy);
 }
 
-void print_geometry_figures(const GeometryCase& c,
-                            const Record& record,
-                            const PoseWitness& witness) {
+struct GeometryFigure {
+  std::string name;
+  double value = 0.0;
+  std::string_view unit;
+};
+
+std::vector<GeometryFigure> figures_of(const GeometryCase& c,
+                                       const Record& record,
+                                       const PoseWitness& witness) {
   const nlohmann::json& values = record.find(calibration::kGeometryStep)->values;
-  const auto print = [&](std::string_view figure, double value, std::string_view unit) {
-    print_figure(fmt::format("calibration.{}", figure), c.name, value, unit);
-  };
-  print("camera_rms_px", values["camera_rms_px"], "px");
-  print("projector_rms_px", values["projector_rms_px"], "px");
-  print("stereo_rms_px", values["stereo_rms_px"], "px");
-  print("length_error", std::abs(values["length_error"].get<double>()), "1");
   const CameraModel& camera = record.measured.camera_lens->model;
   const CameraModel& projector = record.measured.projector_lens->model;
-  print("camera_focal_error", focal_error(camera, c.rig.camera.model), "1");
-  print("projector_focal_error", focal_error(projector, c.scene.projector), "1");
-  print("camera_principal_point_error_px", principal_error(camera, c.rig.camera.model), "px");
-  print("projector_principal_point_error_px", principal_error(projector, c.scene.projector), "px");
-  print("projector_place_error_mm", length(projector.centre() - c.scene.projector.centre()), "mm");
   double good_left_out = 0.0;
   double bad_kept = 0.0;
   for (const auto& pose : values["poses"]) {
@@ -120,19 +125,29 @@ void print_geometry_figures(const GeometryCase& c,
     good_left_out += is_left_out && !is_bad ? 1.0 : 0.0;
     bad_kept += is_bad && !is_left_out ? 1.0 : 0.0;
   }
-  print("bad_poses", static_cast<double>(witness.bad.size()), "1");
-  print("bad_poses_kept", bad_kept, "1");
-  print("good_poses_left_out", good_left_out, "1");
+  return {
+      {"camera_rms_px", values["camera_rms_px"], "px"},
+      {"projector_rms_px", values["projector_rms_px"], "px"},
+      {"stereo_rms_px", values["stereo_rms_px"], "px"},
+      {"length_error", std::abs(values["length_error"].get<double>()), "1"},
+      {"camera_focal_error", focal_error(camera, c.rig.camera.model), "1"},
+      {"projector_focal_error", focal_error(projector, c.scene.projector), "1"},
+      {"camera_principal_point_error_px", principal_error(camera, c.rig.camera.model), "px"},
+      {"projector_principal_point_error_px", principal_error(projector, c.scene.projector), "px"},
+      {"projector_place_error_mm", length(projector.centre() - c.scene.projector.centre()), "mm"},
+      {"bad_poses", static_cast<double>(witness.bad.size()), "1"},
+      {"bad_poses_kept", bad_kept, "1"},
+      {"good_poses_left_out", good_left_out, "1"}};
 }
 
-bool run_geometry(const GeometryCase& c) {
+std::optional<std::vector<GeometryFigure>> run_geometry(const GeometryCase& c) {
   ManualClock clock;
   const auto optics =
       std::make_shared<const sim::BoardOptics>(c.rig.camera, c.rig.projector, c.scene);
   const auto rig = sim::Rig::create(c.rig, optics, &clock);
   if (!rig) {
     fmt::print(stderr, "calibration: {}: {}\n", c.name, rig.error().message);
-    return false;
+    return std::nullopt;
   }
   sim::SimCamera camera(**rig);
   sim::SimProjector projector(**rig);
@@ -151,17 +166,38 @@ bool run_geometry(const GeometryCase& c) {
                "calibration: {}: {}\n",
                c.name,
                done ? calibration::refusal(record.steps.back()) : done.error().message);
-    return false;
+    return std::nullopt;
   }
-  print_geometry_figures(c, record, witness);
+  return figures_of(c, record, witness);
+}
+
+// The median of the runs, the upper one of an even number, and the worst.
+bool print_runs(const std::string& name, int poses, bool spoiled, int runs) {
+  std::map<std::string, std::vector<double>> values;
+  std::vector<GeometryFigure> figures;
+  for (int run = 0; run < runs; ++run) {
+    GeometryCase c = geometry_case(name, poses, run);
+    if (spoiled) c = with_bad_poses(std::move(c));
+    auto found = run_geometry(c);
+    if (!found) return false;
+    figures = *std::move(found);
+    for (const GeometryFigure& figure : figures) values[figure.name].push_back(figure.value);
+  }
+  for (const GeometryFigure& figure : figures) {
+    std::vector<double>& all = values[figure.name];
+    std::ranges::sort(all);
+    const std::string title = fmt::format("calibration.{}", figure.name);
+    print_figure(title, name, all[all.size() / 2], figure.unit);
+    if (runs > 1) print_figure(title, name + "_worst", all.back(), figure.unit);
+  }
   return true;
 }
 
 }  // namespace
 
-bool print_geometry() {
-  const bool sharp = run_geometry(geometry_case("sim", 20));
-  return run_geometry(with_bad_poses(geometry_case("sim_defocused", 21))) && sharp;
+bool print_geometry(int runs) {
+  const bool sharp = print_runs("sim", 20, false, runs);
+  return print_runs("sim_defocused", 21, true, runs) && sharp;
 }
 
 }  // namespace opaline::bench
