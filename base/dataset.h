@@ -38,6 +38,9 @@ struct Dataset {
       view_direction;  ///< on the seen face, 2 channels: the unit vector towards the camera along the face's
                        ///< column and row axes; empty where only view_cosine is known
   std::vector<Illumination> illuminations;
+  std::optional<Illumination>
+      uniform;  ///< the whole face lit where it is seen, lit cells not masked: tells what the
+                ///< surface reflects (base/surface_reflectance.h); no part of the fit
 };
 
 }  // namespace opaline

@@ -44,6 +44,7 @@ class SessionDirectory {
   std::filesystem::path hdr() const { return path_ / "hdr"; }
   std::filesystem::path checkpoint() const { return path_ / "checkpoint"; }
   std::filesystem::path material() const { return path_ / "material.vdb"; }
+  std::filesystem::path surface() const { return path_ / "surface_reflectance.exr"; }
   std::filesystem::path reconstruction() const { return path_ / "reconstruction.json"; }
   std::filesystem::path preview() const { return path_ / "preview"; }
   std::filesystem::path report() const { return path_ / "report.html"; }

@@ -32,8 +32,11 @@ struct ExposureOptions {
 
 /// Which lights the sample is measured under.
 struct PatternOptions {
-  int regions = 4;          ///< n: the lit face in n x n regions; 1 to 32
-  int held_out_lights = 8;  ///< shifted by half a region, larger, smaller: never fitted; 0 to 8
+  int regions = 4;             ///< n: the lit face in n x n regions; 1 to 32
+  int held_out_lights = 8;     ///< shifted by half a region, larger, smaller: never fitted; 0 to 8
+  bool uniform_light = false;  ///< the whole face at once, too: for the reflectance of its surface
+  int uniform_light_code =
+      96;  ///< its code, 1 to 255: a lit cell shines far brighter than those beside one
 };
 
 /// How a session is captured.

@@ -29,7 +29,7 @@ Illumination illumination_of(const Light& light,
                         surface.variance,
                         surface.mask};
   if (!usable) std::ranges::fill(measured.mask.samples(), std::uint8_t{0});
-  if (sample.lit_face == sample.seen_face) {
+  if (sample.lit_face == sample.seen_face && !light.uniform) {
     mask_direct_light(sample.block, sample.lit_face, light.irradiance, margin_mm, measured.mask);
   }
   return measured;

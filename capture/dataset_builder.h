@@ -11,7 +11,8 @@ namespace opaline::capture {
 Dataset empty_dataset(const SampleGeometry& sample, const SurfaceMap& map);
 
 /// One light's measurement for the dataset. Where the camera looks at the lit face itself, cells
-/// within `margin_mm` of directly lit ones are masked. `usable` false masks everything.
+/// within `margin_mm` of directly lit ones are masked, but in the uniform light, which is there to
+/// show them. `usable` false masks everything.
 Illumination illumination_of(const Light& light,
                              const SurfaceRadiance& surface,
                              const SampleGeometry& sample,

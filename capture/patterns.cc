@@ -52,6 +52,7 @@ struct NamedRectangle {
   std::string name;
   bool held_out = false;
   LitRectangle rectangle;
+  bool uniform = false;
 };
 
 struct Place {  // in regions
@@ -120,6 +121,8 @@ std::vector<NamedRectangle> rectangles(const PatternOptions& options,
   for (auto& light : held_out_rectangles(n, options.held_out_lights, width, height)) {
     lights.push_back(std::move(light));
   }
+  if (options.uniform_light)
+    lights.push_back({"uniform", true, {0.0, 0.0, n * width, n * height}, true});
   return lights;
 }
 
@@ -167,11 +170,12 @@ Result<PixelRectangle> pixels_within(const NamedRectangle& light,
 
 drivers::Pattern pattern_of(const PixelRectangle& box,
                             std::uint64_t id,
+                            std::uint8_t code,
                             const ProjectorCalibration& projector) {
   drivers::Pattern pattern{id, Image<std::uint8_t>(projector.width, projector.height, 3, 0)};
   for (int y = box.top; y < box.bottom; ++y) {
     for (int x = box.left; x < box.right; ++x) {
-      for (int c = 0; c < 3; ++c) pattern.codes.at(x, y, c) = 255;
+      for (int c = 0; c < 3; ++c) pattern.codes.at(x, y, c) = code;
     }
   }
   return pattern;
@@ -232,10 +236,12 @@ Result<PatternSet> make_patterns(const PatternOptions& options,
   for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
     const auto box = pixels_within(light, projector);
     if (!box) return box.error();
-    drivers::Pattern pattern = pattern_of(*box, id++, projector);
+    const int code = light.uniform ? options.uniform_light_code : 255;
+    drivers::Pattern pattern = pattern_of(*box, id++, static_cast<std::uint8_t>(code), projector);
     pattern.name = light.name;
     Image<float> irradiance = irradiance_of(pattern.codes, block, lit_face, projector);
-    set.lights.push_back({light.name, light.held_out, std::move(pattern), std::move(irradiance)});
+    set.lights.push_back(
+        {light.name, light.held_out, light.uniform, std::move(pattern), std::move(irradiance)});
   }
   return set;
 }

@@ -30,6 +30,7 @@ struct LitRectangle {
 struct Light {
   std::string name;
   bool held_out = false;
+  bool uniform = false;
   drivers::Pattern pattern;
   Image<float> irradiance;  ///< on the lit face, W/mm^2, above what the black pattern sends there
 };
@@ -43,7 +44,7 @@ struct PatternSet {
 
 /// n x n regions, "region_ROW_COLUMN", then the held-out lights: regions shifted by half a region
 /// ("held_out_shifted_K"), twice and half as large ("held_out_large_K", "held_out_small_K"), as
-/// many of each in turn as fit the face and differ.
+/// many of each in turn as fit the face and differ; at last "uniform", the whole face, if wanted.
 ///
 /// Light falls on whole projector pixels: a rectangle ends at the nearest edges, and its irradiance
 /// is what these pixels send, cell by cell by area. Errors: kInvalidArgument when the projector

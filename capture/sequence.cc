@@ -132,8 +132,9 @@ Result<void> Sequence::prepare(std::stop_token stop) {
 }
 
 Result<void> Sequence::note_plan() {
-  const auto held_out = std::ranges::count(patterns_.lights, true, &Light::held_out);
-  const auto regions = std::ssize(patterns_.lights) - held_out;
+  const auto uniform = std::ranges::count(patterns_.lights, true, &Light::uniform);
+  const auto held_out = std::ranges::count(patterns_.lights, true, &Light::held_out) - uniform;
+  const auto regions = std::ssize(patterns_.lights) - held_out - uniform;
   if (held_out < task_.options.patterns.held_out_lights) {
     log::warning("{} held-out lights instead of {}: no more of them differ on {} regions",
                  held_out,
@@ -247,7 +248,7 @@ Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token
 
 // Cells that are lit directly where the lit face is seen: 1.
 Image<std::uint8_t> Sequence::ignored_in(const Light& light) const {
-  if (task_.sample.lit_face != task_.sample.seen_face) return {};
+  if (task_.sample.lit_face != task_.sample.seen_face || light.uniform) return {};
   const Block& block = task_.sample.block;
   const Face face = task_.sample.seen_face;
   Image<std::uint8_t> kept(block.face_width(face), block.face_height(face), 1, 1);
@@ -345,8 +346,13 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
   const fs::path path = work_.directory / "hdr" / (light.name + ".exr");
   if (auto written = write_hdr(work_.files, path, hdr); !written) return written;
   const SurfaceRadiance surface = map_.apply(hdr, task_.options.min_coverage);
-  dataset_.illuminations.push_back(illumination_of(
-      light, surface, task_.sample, task_.options.direct_light_margin_mm, found->lit));
+  Illumination measured = illumination_of(
+      light, surface, task_.sample, task_.options.direct_light_margin_mm, found->lit);
+  if (light.uniform) {
+    dataset_.uniform = std::move(measured);
+  } else {
+    dataset_.illuminations.push_back(std::move(measured));
+  }
   if (!found->lit) {
     return note_unusable(
         light,
@@ -409,6 +415,11 @@ Result<void> check_sizes(const CaptureTask& task) {
   const Block& b = task.sample.block;
   const bool good = b.nx > 0 && b.ny > 0 && b.nz > 0 && b.hx > 0.0 && b.hy > 0.0 && b.hz > 0.0;
   if (!good) return invalid_argument("sample: expected a block of cells with sizes > 0");
+  if (task.options.patterns.uniform_light && task.sample.lit_face != task.sample.seen_face)
+    return invalid_argument(
+        "uniform_light tells what the lit face reflects, which is not seen: expected lit_face = "
+        "seen_face, or "
+        "uniform_light = false");
   return ok();
 }
 

@@ -103,6 +103,15 @@ void visit_sim_projector(Fields& fields, sim::ProjectorOptics& p) {
                   Range::between(1e-6, 1));
 }
 
+void visit_surface(Fields& fields, sim::SurfaceOptions& surface) {
+  fields.number({"reflectance_per_sr", "of its ground; 0: none"},
+                surface.reflectance,
+                Range::between(0, 0.3));
+  fields.number({"contrast", "of its texture; 0: even"}, surface.contrast, Range::between(0, 3));
+  fields.length_mm({"feature_size", "of its texture"}, surface.feature_mm);
+  fields.whole({"seed", "of its texture"}, surface.seed, kSeed);
+}
+
 void visit_scene(Fields& fields, sim::SceneOptions& scene) {
   fields.one_of({"kind", "what the sample is made of"}, scene.kind, kSceneNames);
   fields.whole({"seed", "of its pattern"}, scene.seed, kSeed);
@@ -158,6 +167,8 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
   fields.table({"scene", "The sample."}, [&](Fields& f) { visit_scene(f, sim.scene); });
   fields.table({"board", "A calibration board in place of the sample."},
                [&](Fields& f) { visit_sim_board(f, sim.board); });
+  fields.table({"surface", "What the sample's surface reflects, where the lit face is seen."},
+               [&](Fields& f) { visit_surface(f, sim.rig.surface); });
   fields.table({"camera", "What its camera does to the light."},
                [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });
   fields.table({"projector", "What its projector does with a picture."},

@@ -76,6 +76,17 @@ void visit_capture(Fields& fields, SessionConfig& session, const Agreement* agre
   fields.whole({"held_out_lights", "kept from the fit: shifted by half a region, larger, smaller"},
                c.patterns.held_out_lights,
                Range::between(0, 8));
+  fields.flag(
+      {"uniform_light",
+       "the whole face at once, too, where the lit face is seen: tells its surface's reflectance"},
+      c.patterns.uniform_light);
+  fields.whole(
+      {"uniform_light_code", "the projector's for it: lit cells are far brighter than others"},
+      c.patterns.uniform_light_code,
+      Range::between(1, 255));
+  fields.check(!c.patterns.uniform_light || session.sample.lit_face == session.sample.seen_face,
+               "uniform_light",
+               "expected false where the lit face is not the seen one");
   fields.whole({"retries", "of a region after a bad frame"}, c.retries, Range::between(0, 100));
   fields.whole({"settle_periods", "projector frames to wait on top of its latency"},
                c.settle_periods,

@@ -108,9 +108,12 @@ std::vector<float> pack_field(const SurfaceField& field) {
   for (const FaceField& face : field.faces) {
     const auto fluence = face.fluence.samples();
     const auto flux = face.net_flux.samples();
+    const auto reflected = face.reflected.samples();
     for (std::size_t i = 0; i < fluence.size(); i += 3) {
       packed.insert(packed.end(), {fluence[i], fluence[i + 1], fluence[i + 2], 0.0F});
       packed.insert(packed.end(), {flux[i], flux[i + 1], flux[i + 2], 0.0F});
+      packed.insert(packed.end(), 4, 0.0F);
+      if (!reflected.empty()) std::copy_n(&reflected[i], 3, packed.end() - 4);
     }
   }
   return packed;

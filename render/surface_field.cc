@@ -39,6 +39,9 @@ Result<void> validate(const SurfaceField& field) {
       return good.error().in(where);
     if (auto good = validate_raster(f.net_flux, width, height, "net flux"); !good)
       return good.error().in(where);
+    if (f.reflected.empty()) continue;
+    if (auto good = validate_raster(f.reflected, width, height, "reflected light"); !good)
+      return good.error().in(where);
   }
   return ok();
 }

@@ -13,6 +13,9 @@ namespace opaline::render {
 struct FaceField {
   Image<float> fluence;   ///< phi_s on the surface, 3 channels (RGB), W/mm^2
   Image<float> net_flux;  ///< J_n through it, outwards positive, 3 channels, W/mm^2
+  Image<float> reflected =
+      {};  ///< off the surface itself, the same in all directions, 3 channels, W/(mm^2 sr);
+           ///< empty: none
 };
 
 /// What a renderer needs to know of a lit block: the P1 field on its surface, from which
@@ -21,7 +24,7 @@ struct FaceField {
 ///   / eta^2)
 ///                                                                 (docs/physics.md, "Radiance
 ///                                                                 towards a camera")
-/// follows in any direction. Between the centres of face cells phi_s and J_n are bilinear, beyond
+/// follows in any direction, plus what the surface reflects. Between the centres of face cells phi_s and J_n are bilinear, beyond
 /// the last constant.
 struct SurfaceField {
   Block block;

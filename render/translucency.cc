@@ -11,6 +11,7 @@
 #include "base/face_view.h"
 #include "reconstruct/diffusion/camera_rays.h"
 #include "reconstruct/diffusion/fresnel.h"
+#include "reconstruct/diffusion/lit_surface.h"
 #include "reconstruct/diffusion/medium.h"
 
 namespace opaline::render {
@@ -74,11 +75,11 @@ class Channel {
   }
 
   void write_surface(const Light& light, std::span<const double> phi, SurfaceField& field) {
-    const diffusion::SurfaceTerms terms =
-        entry(light.lit_face).surface_terms(transmitted(light, ior_, channel_));
+    const std::vector<double> q = transmitted(light, ior_, channel_);
+    const Entered entered{entry(light.lit_face).surface_terms(q), q};
     for (const Face face : kFaces) {
       const bool lit = face == light.lit_face;
-      write_face(face, phi, lit ? terms : diffusion::SurfaceTerms{}, field);
+      write_face(face, phi, lit ? entered : Entered{}, field);
     }
   }
 
@@ -89,7 +90,12 @@ class Channel {
     return *made;
   }
 
+  struct Entered {  // by the face; empty where it is dark
+    diffusion::SurfaceTerms terms;
+    std::vector<double> q;
+  };
   struct View {
+    std::vector<diffusion::CameraRay> directions;
     diffusion::CameraRays rays;
     std::vector<double> flux_gain;  // 2 A + 3 mu_i
   };
@@ -107,15 +113,22 @@ class Channel {
       }
     }
     views_[static_cast<std::size_t>(face)].emplace(
-        View{diffusion::CameraRays(medium_, boundary_, face, rays), std::move(flux_gain)});
+        View{rays, diffusion::CameraRays(medium_, boundary_, face, rays), std::move(flux_gain)});
   }
 
   // The net flux whose P1 radiance is what the rays see.
   void see(const View& view,
+           Face face,
            std::span<const double> phi,
-           const diffusion::SurfaceTerms& terms,
+           const Entered& entered,
            std::span<double> flux) const {
+    const diffusion::SurfaceTerms& terms = entered.terms;
     view.rays.gather(phi.data(), terms.source, flux);
+    if (source_.model == diffusion::SourceModel::kCollimated && !entered.q.empty()) {
+      const auto more =
+          diffusion::lit_surface(medium_, boundary_, ior_, face, view.directions, entered.q);
+      for (std::size_t i = 0; i < flux.size(); ++i) flux[i] += more[i];
+    }
     for (std::size_t i = 0; i < flux.size(); ++i) {
       const double source = terms.source.empty() ? 0.0 : terms.source[i];
       const double escape = terms.escape.empty() ? 0.0 : terms.escape[i];
@@ -125,11 +138,12 @@ class Channel {
 
   void write_face(Face face,
                   std::span<const double> phi,
-                  const diffusion::SurfaceTerms& terms,
+                  const Entered& entered,
                   SurfaceField& field) const {
+    const diffusion::SurfaceTerms& terms = entered.terms;
     std::vector<double> flux(medium_.block.face_cell_count(face));
     if (const auto& view = views_[static_cast<std::size_t>(face)]) {
-      see(*view, phi, terms, flux);
+      see(*view, face, phi, entered, flux);
     } else {
       diffusion::net_flux(medium_, boundary_, face, phi, terms.source, terms.escape, flux);
     }
@@ -182,6 +196,13 @@ Result<void> illuminate_channel(Channel& channel,
 }
 
 }  // namespace
+
+Image<float> reflected(const Image<float>& reflectance, const Image<float>& irradiance) {
+  Image<float> radiance = reflectance;
+  for (std::size_t i = 0; i < radiance.samples().size(); ++i)
+    radiance.samples()[i] *= irradiance.samples()[i];
+  return radiance;
+}
 
 Result<std::vector<SurfaceField>> illuminate(const Material& material,
                                              std::span<const Light> lights,

@@ -29,10 +29,13 @@ struct TranslucencyOptions {
   reconstruct::diffusion::SourceOptions source;
   reconstruct::diffusion::SolveOptions solve;
   /// Where the pictures will be taken from, mm. Faces turned to it then shine towards it as the fluence along refracted
-  /// rays makes them (reconstruct/diffusion/camera_rays.h): J_n and phi_s = S + 2 A J_n are those of the P1 field of that
+  /// rays makes them (reconstruct/diffusion/camera_rays.h; on a lit face with diffusion/lit_surface.h): J_n and phi_s = S + 2 A J_n are those of the P1 field of that
   /// radiance. From elsewhere, and without an eye, they are the P1 field's own.
   std::optional<Vec3> eye;
 };
+
+/// Light off a surface of reflectance rho_s (1/sr) under irradiance E, face cells, 3 channels: FaceField::reflected.
+Image<float> reflected(const Image<float>& reflectance, const Image<float>& irradiance);
 
 /// How a block of the material glows under each light: the diffusion equation, solved channel by channel for all lights
 /// at once, and from its fluence phi on the surface (docs/physics.md, "Boundary" and "Discretisation on a block sample")

@@ -116,7 +116,7 @@ Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
     return good.error().in("transport responses");
   return create(options,
                 std::make_shared<const StationOptics>(
-                    options.camera, options.projector, std::move(responses)),
+                    options.camera, options.projector, std::move(responses), options.surface),
                 clock);
 }
 

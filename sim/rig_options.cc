@@ -11,6 +11,7 @@ Result<void> validate(const RigOptions& options) {
   }
   if (auto good = validate(options.camera); !good) return good.error().in("camera");
   if (auto good = validate(options.projector); !good) return good.error().in("projector");
+  if (auto good = validate(options.surface); !good) return good.error().in("surface");
   return ok();
 }
 

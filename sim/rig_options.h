@@ -6,6 +6,7 @@
 #include "base/result.h"
 #include "sim/faults.h"
 #include "sim/optics.h"
+#include "sim/surface_reflectance.h"
 
 namespace opaline::sim {
 
@@ -15,8 +16,9 @@ struct RigOptions {
   double time_factor = 1.0;  ///< how many times as fast as real time its clock runs; 1 to 1000
   CameraOptics camera;
   ProjectorOptics projector;
-  std::string identity;  ///< tells it from rigs of other options; whatever its builder likes
-  Faults faults;         ///< to come, from the start
+  SurfaceOptions surface;  ///< where the lit face is the one that is seen
+  std::string identity;    ///< tells it from rigs of other options; whatever its builder likes
+  Faults faults;           ///< to come, from the start
 };
 /// Errors: kInvalidArgument naming the option, its value and what was expected.
 Result<void> validate(const RigOptions& options);

@@ -146,10 +146,13 @@ Image<float> blurred(const Image<float>& picture, double sigma_px) {
 
 StationOptics::StationOptics(const CameraOptics& camera,
                              const ProjectorOptics& projector,
-                             std::shared_ptr<const TransportResponses> responses)
+                             std::shared_ptr<const TransportResponses> responses,
+                             const SurfaceOptions& surface)
     : camera_(camera), projector_(projector), responses_(std::move(responses)) {
   const Block& block = responses_->block;
   const Face face = responses_->seen_face;
+  if (face == responses_->lit_face && surface.reflectance > 0.0)
+    reflectance_ = surface_reflectance(surface, block, face);
   const FaceView view(camera.model, block, face);
   auto above = corner_row(view, camera.model.width, 0);
   for (int y = 0; y < camera.model.height; ++y) {
@@ -177,6 +180,7 @@ StationLight StationOptics::light(const Image<std::uint8_t>& codes) const {
                                             responses_->patches_y,
                                             codes);
   light.surface_radiance = surface(light.patch_irradiance);
+  if (!reflectance_.empty()) reflect(codes, light.surface_radiance);
   light.sensor_radiance = blurred(seen(light.surface_radiance), camera_.psf_sigma_px);
   return light;
 }
@@ -200,6 +204,18 @@ Image<float> StationOptics::surface(const std::vector<Rgb>& patch_irradiance) co
     }
   }
   return sum;
+}
+
+void StationOptics::reflect(const Image<std::uint8_t>& codes, Image<float>& radiance) const {
+  const std::vector<Rgb> irradiance = patch_irradiance(projector_,
+                                                       responses_->block,
+                                                       responses_->lit_face,
+                                                       radiance.width(),
+                                                       radiance.height(),
+                                                       codes);
+  const std::span<const float> reflectance = reflectance_.samples();
+  for (std::size_t i = 0; i < reflectance.size(); ++i)
+    radiance.samples()[i] += static_cast<float>(irradiance[i / 3][i % 3]) * reflectance[i];
 }
 
 Image<float> StationOptics::seen(const Image<float>& surface) const {

@@ -8,6 +8,7 @@
 #include "base/image.h"
 #include "base/transport_responses.h"
 #include "sim/optics.h"
+#include "sim/surface_reflectance.h"
 
 namespace opaline::sim {
 
@@ -38,14 +39,15 @@ class LightPath {
 
 /// Follows light from the projector through the sample to the camera's pixels: patch irradiances
 /// weight the stored responses (light adds), and every pixel averages the surface cells that its
-/// area sees. Around the seen face, the block's other sides included, the camera sees black.
+/// area sees. Where the lit face is seen, its surface reflects some of the light at once (SurfaceOptions). Around the seen face, the block's other sides included, the camera sees black.
 ///
 /// Threads: const, so any number at a time.
 class StationOptics : public LightPath {
  public:
   StationOptics(const CameraOptics& camera,
                 const ProjectorOptics& projector,
-                std::shared_ptr<const TransportResponses> responses);
+                std::shared_ptr<const TransportResponses> responses,
+                const SurfaceOptions& surface = {});
 
   StationLight light(const Image<std::uint8_t>& codes) const override;
   StationLight dark() const override;
@@ -55,6 +57,7 @@ class StationOptics : public LightPath {
 
  private:
   Image<float> surface(const std::vector<Rgb>& patch_irradiance) const;
+  void reflect(const Image<std::uint8_t>& codes, Image<float>& radiance) const;
   Image<float> seen(const Image<float>& surface) const;
 
   struct Share {
@@ -64,6 +67,7 @@ class StationOptics : public LightPath {
   CameraOptics camera_;
   ProjectorOptics projector_;
   std::shared_ptr<const TransportResponses> responses_;
+  Image<float> reflectance_;                ///< of the seen face's surface; empty: none
   std::vector<std::uint32_t> first_share_;  ///< per pixel, and one behind the last
   std::vector<Share> shares_;
 };

@@ -76,6 +76,14 @@ bool valid_name(const std::string& name) {
          name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string::npos;
 }
 
+/// As the files hold them: the illuminations, the uniform one last.
+std::vector<const Illumination*> lights_of(const Dataset& set) {
+  std::vector<const Illumination*> lights;
+  for (const Illumination& light : set.illuminations) lights.push_back(&light);
+  if (set.uniform) lights.push_back(&*set.uniform);
+  return lights;
+}
+
 Result<void> check(const Dataset& set) {
   if (!fits(set.view_cosine, set.block, set.seen_face, 1)) {
     return invalid_argument("dataset: view_cosine does not fit the seen face");
@@ -85,24 +93,25 @@ Result<void> check(const Dataset& set) {
     return invalid_argument("dataset: view_direction does not fit the seen face");
   }
   std::set<std::string> names;
-  for (const Illumination& light : set.illuminations) {
-    if (!valid_name(light.name) || !names.insert(light.name).second) {
+  for (const Illumination* light : lights_of(set)) {
+    if (!valid_name(light->name) || !names.insert(light->name).second) {
       return invalid_argument(fmt::format(
-          "dataset: illumination \"{}\": expected names of a-z 0-9 _ -, each once", light.name));
+          "dataset: illumination \"{}\": expected names of a-z 0-9 _ -, each once", light->name));
     }
-    if (!fits(light.irradiance, set.block, set.lit_face, kColorChannels) ||
-        !fits(light.radiance, set.block, set.seen_face, kColorChannels) ||
-        !fits(light.radiance_variance, set.block, set.seen_face, kColorChannels) ||
-        !fits(light.mask, set.block, set.seen_face, 1)) {
+    if (!fits(light->irradiance, set.block, set.lit_face, kColorChannels) ||
+        !fits(light->radiance, set.block, set.seen_face, kColorChannels) ||
+        !fits(light->radiance_variance, set.block, set.seen_face, kColorChannels) ||
+        !fits(light->mask, set.block, set.seen_face, 1)) {
       return invalid_argument(
-          fmt::format("dataset: a raster of {} does not fit its face", light.name));
+          fmt::format("dataset: a raster of {} does not fit its face", light->name));
     }
   }
   return ok();
 }
 
 ImageFile seen_image(const Dataset& set) {
-  const int count = static_cast<int>(set.illuminations.size());
+  const auto lights = lights_of(set);
+  const int count = static_cast<int>(lights.size());
   const bool directed = !set.view_direction.samples().empty();
   const int before = directed ? 1 + kDirectionChannels : 1;
   Image<float> pixels(
@@ -114,7 +123,7 @@ ImageFile seen_image(const Dataset& set) {
     copy_in(pixels, 1, set.view_direction);
   }
   for (int i = 0; i < count; ++i) {
-    const Illumination& light = set.illuminations[static_cast<std::size_t>(i)];
+    const Illumination& light = *lights[static_cast<std::size_t>(i)];
     const int first = before + kSeenChannels * i;
     copy_in(pixels, first, light.radiance);
     copy_in(pixels, first + 3, light.radiance_variance);
@@ -126,13 +135,14 @@ ImageFile seen_image(const Dataset& set) {
 
 // With no illumination at all the raster is one channel of zeros, since an EXR cannot be empty.
 ImageFile light_image(const Dataset& set) {
-  const int count = static_cast<int>(set.illuminations.size());
+  const auto lights = lights_of(set);
+  const int count = static_cast<int>(lights.size());
   Image<float> pixels(set.block.face_width(set.lit_face),
                       set.block.face_height(set.lit_face),
                       std::max(1, kLightChannels * count));
   std::vector<std::string> channels;
   for (int i = 0; i < count; ++i) {
-    const Illumination& light = set.illuminations[static_cast<std::size_t>(i)];
+    const Illumination& light = *lights[static_cast<std::size_t>(i)];
     copy_in(pixels, kLightChannels * i, light.irradiance);
     for (std::string& name : rgb(light.name + ".irradiance")) channels.push_back(std::move(name));
   }
@@ -151,9 +161,9 @@ Result<std::string> write_image(FileOperations& files,
 
 json describe(const Dataset& set) {
   json lights = json::array();
-  for (const Illumination& light : set.illuminations) {
-    lights.push_back({{"name", light.name}, {"held_out", light.held_out}});
-  }
+  for (const Illumination* light : lights_of(set))
+    lights.push_back({{"name", light->name}, {"held_out", light->held_out}});
+  if (set.uniform) lights.back()["uniform"] = true;
   return {{"format", kDatasetFormat},
           {"cells", set.block.cells()},
           {"spacing_mm", set.block.spacing()},
@@ -204,6 +214,10 @@ Result<Dataset> header_from(const json& sidecar) {
     added.name = light.at("name").get<std::string>();
     added.held_out = light.at("held_out").get<bool>();
   }
+  if (!set.illuminations.empty() && sidecar.at("illuminations").back().value("uniform", false)) {
+    set.uniform = std::move(set.illuminations.back());
+    set.illuminations.pop_back();
+  }
   const bool sane = *std::ranges::min_element(cells) > 0 && *std::ranges::min_element(spacing) > 0;
   if (!sane) return invalid_argument("cells and spacing are not > 0");
   if (set.illuminations.size() > kMaxIlluminations) return invalid_argument("too many lights");
@@ -232,6 +246,13 @@ Result<ImageFile> read_image(const fs::path& path, const json& sidecar, int chan
   return image;
 }
 
+std::vector<Illumination*> lights_to_fill(Dataset& set) {
+  std::vector<Illumination*> lights;
+  for (Illumination& light : set.illuminations) lights.push_back(&light);
+  if (set.uniform) lights.push_back(&*set.uniform);
+  return lights;
+}
+
 Result<void> fill_seen(const ImageFile& file, Dataset& set) {
   const auto cosine = select_channels(file, std::array<std::string, 1>{"view_cosine"});
   if (!cosine) return cosine.error();
@@ -242,26 +263,26 @@ Result<void> fill_seen(const ImageFile& file, Dataset& set) {
     if (!direction) return direction.error();
     set.view_direction = *direction;
   }
-  for (Illumination& light : set.illuminations) {
-    const auto pixels = select_channels(file, seen_channels(light.name));
+  for (Illumination* light : lights_to_fill(set)) {
+    const auto pixels = select_channels(file, seen_channels(light->name));
     if (!pixels) return pixels.error();
     const int width = pixels->width();
     const int height = pixels->height();
-    light.radiance = Image<float>(width, height, kColorChannels);
-    light.radiance_variance = Image<float>(width, height, kColorChannels);
-    light.mask = Image<std::uint8_t>(width, height, 1);
-    copy_out(*pixels, 0, light.radiance);
-    copy_out(*pixels, 3, light.radiance_variance);
-    copy_out(*pixels, 6, light.mask);
+    light->radiance = Image<float>(width, height, kColorChannels);
+    light->radiance_variance = Image<float>(width, height, kColorChannels);
+    light->mask = Image<std::uint8_t>(width, height, 1);
+    copy_out(*pixels, 0, light->radiance);
+    copy_out(*pixels, 3, light->radiance_variance);
+    copy_out(*pixels, 6, light->mask);
   }
   return ok();
 }
 
 Result<void> fill_light(const ImageFile& file, Dataset& set) {
-  for (Illumination& light : set.illuminations) {
-    auto pixels = select_channels(file, rgb(light.name + ".irradiance"));
+  for (Illumination* light : lights_to_fill(set)) {
+    auto pixels = select_channels(file, rgb(light->name + ".irradiance"));
     if (!pixels) return pixels.error();
-    light.irradiance = *std::move(pixels);
+    light->irradiance = *std::move(pixels);
   }
   return ok();
 }
@@ -284,7 +305,7 @@ Result<Dataset> read_dataset(const fs::path& directory) {
   if (!sidecar) return sidecar.error();
   auto set = parse_header(directory / kSidecar, *sidecar);
   if (!set) return set.error();
-  const int count = static_cast<int>(set->illuminations.size());
+  const int count = static_cast<int>(lights_of(*set).size());
   const auto seen =
       read_image(directory / kSeenFile, *sidecar, 1 + kDirectionChannels + kSeenChannels * count);
   if (!seen) return seen.error();

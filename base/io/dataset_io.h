@@ -8,15 +8,15 @@
 
 namespace opaline {
 
-inline constexpr int kDatasetFormat = 2;  ///< 1: without view_direction
+inline constexpr int kDatasetFormat = 3;  ///< 1: without view_direction; 2: without a uniform light
 
 /// A dataset on disk, in `directory`:
 ///
 ///   dataset.exr        the seen face: view_cosine, view_direction.column and .row; per illumination
 ///                      NAME.radiance.R G B, NAME.variance.R G B and NAME.mask (0 or 1)
 ///   dataset_light.exr  the lit face: per illumination NAME.irradiance.R G B
-///   dataset.json       format version, block, ior, faces, the illuminations in order, SHA-256 of
-///                      both
+///   dataset.json       format version, block, ior, faces, the illuminations in order, the uniform
+///                      one last and marked as such, SHA-256 of both
 ///
 /// dataset.json is written last and each file whole, so what can be read is complete. The same
 /// dataset gives the same bytes.

@@ -4,6 +4,7 @@
 
 #include "base/clock.h"
 #include "base/io/dataset_io.h"
+#include "base/io/surface_io.h"
 #include "base/io/volume_io.h"
 #include "base/log.h"
 #include "config/session_config.h"
@@ -15,6 +16,7 @@
 #include "reconstruct/back_end.h"
 #include "reconstruct/material_uncertainty.h"
 #include "reconstruct/summary.h"
+#include "reconstruct/surface_reflectance.h"
 #include "reconstruct/target_error.h"
 
 namespace opaline::daemon {
@@ -115,6 +117,17 @@ Result<void> reconstruct_sphere(const config::SessionConfig& config, JobContext&
   return write_whole(job.files, job.session.reconstruction(), told.dump(2) + "\n");
 }
 
+/// Where the session has a picture under uniform light.
+Result<void> write_surface_reflectance(JobContext& job,
+                                       const Dataset& dataset,
+                                       const Material& found,
+                                       const reconstruct::InverseOptions& options,
+                                       reconstruct::diffusion::FluenceSolver& solver) {
+  const auto surface = reconstruct::surface_reflectance(dataset, found, options, solver, job.stop);
+  if (!surface) return surface.error();
+  return *surface ? write_surface(job.files, job.session.surface(), **surface) : ok();
+}
+
 Result<void> reconstruct_session(JobContext& job) {
   auto config = config::load_resolved(job.session);
   if (!config) return config.error();
@@ -149,6 +162,9 @@ Result<void> reconstruct_session(JobContext& job) {
                                 fmt::format("opaline-reconstruct {}", version()),
                                 uncertainty->found ? &uncertainty->found->material : nullptr);
   if (!written) return written;
+  auto surface = write_surface_reflectance(
+      job, *dataset, found->result.material, config->reconstruction, *back_end->solver);
+  if (!surface) return surface;
   return write_whole(
       job.files, job.session.reconstruction(), summary(*config, *dataset, *found, *uncertainty));
 }

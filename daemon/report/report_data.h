@@ -12,6 +12,7 @@
 #include "daemon/report/hdr_picture.h"
 #include "daemon/report/relighting.h"
 #include "daemon/report/stage_times.h"
+#include "daemon/report/surface_view.h"
 
 namespace opaline::daemon {
 
@@ -41,8 +42,9 @@ struct ReportData {
   std::optional<Material> truth;  ///< of a simulated sample
   nlohmann::json reconstruction;  ///< reconstruction.json
   std::vector<ContactPicture> contacts;
-  std::vector<RelitLight> lights;  ///< the held-out ones that could be used; may be none
-  std::vector<SurfaceFit> fits;    ///< all
+  std::vector<RelitLight> lights;      ///< the held-out ones that could be used; may be none
+  std::vector<SurfaceFit> fits;        ///< all
+  std::optional<SurfaceView> surface;  ///< where the session has a picture under uniform light
   std::vector<DrawnPlot> plots;
   std::optional<ChannelErrors> bssrdf;
   std::string bssrdf_absent;  ///< why there is no BSSRDF error

@@ -126,6 +126,8 @@ void add_header(const ReportData& data, Page& page) {
                                   {"timings", "Timings"},
                                   {"settings", "Settings"}}) {
     page.add(fmt::format("<a href=\"#{}\">{}</a>", id, title));
+    if (data.surface && std::string_view(id) == "capture")
+      page.add("<a href=\"#surface\">Surface</a>");
   }
   page.add("</nav></header>\n");
 }
@@ -202,6 +204,40 @@ void add_capture(const ReportData& data, Page& page) {
     page.add_picture(std::move(picture), contact.name + saturated);
   }
   page.add("</div>\n");
+  page.end();
+}
+
+std::string triple(const std::array<double, 3>& values, std::string_view unit, double scale) {
+  return fmt::format(
+      "{:.3g}, {:.3g}, {:.3g} {}", scale * values[0], scale * values[1], scale * values[2], unit);
+}
+
+void add_surface(const SurfaceView& view, Page& page) {
+  page.begin("surface", "What the surface reflects by itself");
+  page.add(
+      html::paragraph("The whole face lit at once: what the camera saw, what the material explains "
+                      "with light that was in it, and both "
+                      "with the surface's own reflection, ρₛ = (L − L_material) / E. It holds for "
+                      "this direction of light and view; "
+                      "surface_reflectance.exr has it."));
+  const double white = white_point(view.captured, 0.998);
+  page.add("<div class=\"trio\">\n");
+  page.add_picture(tone_mapped(view.captured, white), "captured");
+  page.add_picture(tone_mapped(view.material, white), "the material alone");
+  page.add_picture(tone_mapped(view.relit, white), "with its surface");
+  page.add("</div>\n");
+  const Image<float>& rho = view.surface.reflectance;
+  const double brightest = white_point(rho, 0.998);
+  page.add_picture(
+      tone_mapped(rho, brightest > 0.0 ? brightest : 1.0),
+      fmt::format(
+          "ρₛ on the cells of {}; white is {:.3g} /sr", to_string(view.surface.face), brightest));
+  std::vector<std::pair<std::string, std::string>> facts{
+      {"Median ρₛ: red, green, blue", triple(view.median, "/sr", 1.0)}};
+  if (view.has_truth)
+    facts.emplace_back("Against the simulated sample's: red, green, blue",
+                       triple(view.error, "% off", 100.0));
+  page.add(html::facts(facts));
   page.end();
 }
 
@@ -296,6 +332,7 @@ Result<std::string> report_page(const ReportData& data) {
   if (!data.lights.empty()) add_trio(showpiece(data), data, page);
   add_relighting(data, page);
   add_capture(data, page);
+  if (data.surface) add_surface(*data.surface, page);
   add_fit(data, page);
   add_model(data, page);
   add_convergence(data, page);

@@ -78,6 +78,12 @@ Json pictures_json(const ReportData& data) {
   return {{"white", data.white}, {"difference_scale", data.difference}};
 }
 
+Json surface_json(const SurfaceView& view) {
+  Json json{{"median_reflectance_per_sr", view.median}};
+  if (view.has_truth) json["error_against_truth"] = view.error;
+  return json;
+}
+
 }  // namespace
 
 std::string results_json(const ReportData& data) {
@@ -101,6 +107,7 @@ std::string results_json(const ReportData& data) {
   json["fit"] = fit_json(data);
   json["fit_noise_floor"] = data.fit().all().floor();
   json["capture"] = capture_json(data);
+  if (data.surface) json["surface"] = surface_json(*data.surface);
   json["pictures"] = pictures_json(data);
   json["reconstruction"] = data.reconstruction;
   json["assumptions"] = assumptions_json(data);

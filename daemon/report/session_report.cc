@@ -14,6 +14,7 @@
 #include "base/event_log.h"
 #include "base/io/dataset_io.h"
 #include "base/io/image_io.h"
+#include "base/io/surface_io.h"
 #include "base/io/transport_io.h"
 #include "base/io/volume_io.h"
 #include "daemon/jobs/version.h"
@@ -24,6 +25,7 @@
 #include "daemon/report/report_page.h"
 #include "daemon/report/results.h"
 #include "daemon/report/step_progress.h"
+#include "daemon/report/surface_view.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/renderer.h"
 #include "render/translucency.h"
@@ -100,6 +102,8 @@ class SessionReport {
   Result<void> light_the_material();
   Result<void> compare_all(render::Renderer& renderer);
   Result<void> compare(render::Renderer& renderer, std::size_t index);
+  Result<void> look_at_surface(render::Renderer& renderer);
+  Result<void> write_surface_pictures(const SurfaceView& view);
   Result<void> compare_with_transport();
   Result<void> read_facts();
   Result<void> write_pictures(const RelitLight& light);
@@ -123,6 +127,7 @@ Result<void> SessionReport::run(const gpu::ContextOptions& gpu) {
   data_.renderer = (*renderer)->description();
   if (auto done = light_the_material(); !done) return done;
   if (auto done = compare_all(**renderer); !done) return done;
+  if (auto done = look_at_surface(**renderer); !done) return done;
   if (auto done = compare_with_transport(); !done) return done;
   return write_report();
 }
@@ -193,6 +198,41 @@ Result<void> SessionReport::compare(render::Renderer& renderer, std::size_t inde
                        job_.stop);
   if (!relit) return relit.error();
   if (!relit->is_empty()) data_.lights.push_back(*std::move(relit));
+  return ok();
+}
+
+Result<void> SessionReport::look_at_surface(render::Renderer& renderer) {
+  if (!data_.dataset.uniform) return ok();
+  const std::string& name = data_.dataset.uniform->name;
+  auto surface = read_surface(job_.session.surface());
+  if (!surface) return surface.error();
+  auto captured = read_hdr_picture(job_.session.hdr() / (name + ".exr"));
+  if (!captured) return captured.error();
+  data_.contacts.push_back(contact_picture(name, *captured));
+  auto view = surface_view(renderer,
+                           data_,
+                           *std::move(surface),
+                           *std::move(captured),
+                           translucency(data_, data_.config.rig.calibration.camera.model.centre()),
+                           *solver_,
+                           job_.stop);
+  if (!view) return view.error().in("uniform light");
+  data_.surface = *std::move(view);
+  return write_surface_pictures(*data_.surface);
+}
+
+Result<void> SessionReport::write_surface_pictures(const SurfaceView& view) {
+  if (auto made = job_.files.make_directories(job_.session.preview()); !made) return made;
+  const double white = white_point(view.captured, data_.config.preview.white_quantile);
+  for (const auto& [kind, picture] : {std::pair{"captured", &view.captured},
+                                      std::pair{"relit", &view.relit},
+                                      std::pair{"material", &view.material}}) {
+    const std::string name = fmt::format("{}-{}", data_.dataset.uniform->name, kind);
+    const ImageFile png{tone_mapped(*picture, white > 0.0 ? white : 1.0), {}, {}};
+    if (auto done = write_image(name + ".png", png, ImageFormat::kPng); !done) return done;
+    const ImageFile exr{*picture, {}, {{"unit", "W/(mm^2 sr)"}}};
+    if (auto done = write_image(name + ".exr", exr, ImageFormat::kExr); !done) return done;
+  }
   return ok();
 }
 

@@ -1,32 +1,20 @@
 #include "reconstruct/diffusion/fresnel.h"
 
-#include <array>
 #include <cmath>
 
 #include "base/ensure.h"
+#include "reconstruct/diffusion/quadrature.h"
 
 namespace opaline::reconstruct::diffusion {
 namespace {
 
-// Gauss-Legendre nodes and weights on [-1, 1], 8 points (Abramowitz & Stegun, table 25.4), positive
-// half.
-constexpr std::array kNodes{
-    0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
-constexpr std::array kWeights{
-    0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
 constexpr int kPanels = 64;
 
 template <class Function>
 double integrate_unit_interval(const Function& f) {
   double sum = 0.0;
-  constexpr double kHalf = 0.5 / kPanels;
-  for (int panel = 0; panel < kPanels; ++panel) {
-    const double middle = (panel + 0.5) / kPanels;
-    for (std::size_t n = 0; n < kNodes.size(); ++n) {
-      sum += kWeights[n] * (f(middle - kHalf * kNodes[n]) + f(middle + kHalf * kNodes[n]));
-    }
-  }
-  return sum * kHalf;
+  for_gauss_nodes(kPanels, [&](double x, double weight) { sum += weight * f(x); });
+  return sum;
 }
 
 }  // namespace

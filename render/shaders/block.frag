@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 // Radiance towards the camera where the sample's ray meets the face (docs/physics.md, "Radiance towards a camera"):
 //
-//   L = F_t(eta, mu_o) / (4 pi eta^2) (phi_s + 3 J_n mu_i),   mu_i = sqrt(1 - (1 - mu_o^2) / eta^2)
+//   L = F_t(eta, mu_o) / (4 pi eta^2) (phi_s + 3 J_n mu_i) + L_s,   mu_i = sqrt(1 - (1 - mu_o^2) / eta^2)
 //
-// set 0: 0 scene, 1 field (read): for each face cell phi_s (rgb), J_n (rgb), in vec4s
+// set 0: 0 scene, 1 field (read): for each face cell phi_s (rgb), J_n (rgb), L_s (rgb), in vec4s
 #include "scene.glsl"
 layout(location = 0) flat in int face;
 layout(location = 1) noperspective in vec2 undistorted;
@@ -30,17 +30,17 @@ vec2 undistort(vec2 target, vec2 p) {
   return p;
 }
 
-// Bilinear between the centres of face cells, constant beyond the last; `which` is 0 for phi_s, 1 for J_n.
+// Bilinear between the centres of face cells, constant beyond the last; `which` is 0 for phi_s, 1 for J_n, 2 for L_s.
 vec3 sample_field(vec2 at, ivec2 size, int which) {
   const vec2 p = clamp(at - 0.5, vec2(0), vec2(size - 1));
   const ivec2 a = ivec2(p);
   const ivec2 b = min(a + 1, size - 1);
   const vec2 t = p - vec2(a);
   const int first = scene.first[face / 4][face % 4];
-  const vec3 low = mix(field[2 * (first + a.y * size.x + a.x) + which].rgb,
-                       field[2 * (first + a.y * size.x + b.x) + which].rgb, t.x);
-  const vec3 high = mix(field[2 * (first + b.y * size.x + a.x) + which].rgb,
-                        field[2 * (first + b.y * size.x + b.x) + which].rgb, t.x);
+  const vec3 low = mix(field[3 * (first + a.y * size.x + a.x) + which].rgb,
+                       field[3 * (first + a.y * size.x + b.x) + which].rgb, t.x);
+  const vec3 high = mix(field[3 * (first + b.y * size.x + a.x) + which].rgb,
+                        field[3 * (first + b.y * size.x + b.x) + which].rgb, t.x);
   return mix(low, high, t.y);
 }
 
@@ -68,5 +68,5 @@ void main() {
   const float mu_o = min(1.0, abs(direction[plane.axis]) / length(direction));
   const float mu_i = sqrt(1.0 - (1.0 - mu_o * mu_o) / (eta * eta));
   const vec3 inside = sample_field(at, size, 0) + 3.0 * mu_i * sample_field(at, size, 1);
-  radiance = vec4(transmittance(mu_o, mu_i, eta) / (4.0 * kPi * eta * eta) * inside, 1.0);
+  radiance = vec4(transmittance(mu_o, mu_i, eta) / (4.0 * kPi * eta * eta) * inside + sample_field(at, size, 2), 1.0);
 }

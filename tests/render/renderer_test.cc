@@ -144,6 +144,22 @@ TEST_F(RendererTest, ShowsTheRightCellInTheRightPlace) {
     }
 }
 
+// From straight above only the top shows, so that every pixel gains its coverage times the reflected radiance.
+TEST_F(RendererTest, AddsWhatTheSurfaceReflects) {
+  const CameraModel camera = look(kMiddle + Vec3{0.3, 0.2, 120}, kMiddle);
+  SurfaceField field = smooth_field();
+  const Image<float> before = draw(field, camera);
+  FaceField& top = field.faces[static_cast<std::size_t>(Face::kZMax)];
+  top.reflected = Image<float>(top.fluence.width(), top.fluence.height(), 3, 0.5F);
+  const Image<float> after = draw(field, camera);
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(after.at(x, y, c) - before.at(x, y, c), 0.5F * after.at(x, y, 3), 1e-5F);
+  top.reflected = Image<float>(1, 1, 3);
+  EXPECT_FALSE(renderer_->draw(field, camera, {}));
+}
+
 TEST_F(RendererTest, LeavesTheBackgroundBlackAndCoversEdgesInPart) {
   const CameraModel camera = look(kMiddle + Vec3{0.3, 0.2, 120}, kMiddle);
   const Image<float> picture = draw(smooth_field(), camera);

@@ -81,16 +81,19 @@ Result<void> LogSink::fact(std::string_view type, const nlohmann::json& data) {
 
 namespace {
 
-std::unique_ptr<sim::Rig> make_rig(const sim::RigOptions& options, Clock& clock) {
-  auto made = sim::Rig::create(options, tiny_responses(), &clock);
+std::unique_ptr<sim::Rig> make_rig(const sim::RigOptions& options,
+                                   std::shared_ptr<const TransportResponses> responses,
+                                   Clock& clock) {
+  auto made = sim::Rig::create(options, std::move(responses), &clock);
   ENSURE(made.has_value());
   return *std::move(made);
 }
 
 }  // namespace
 
-TinyStation::TinyStation(const sim::RigOptions& options)
-    : rig_(make_rig(options, clock_)), camera_(*rig_), projector_(*rig_) {}
+TinyStation::TinyStation(const sim::RigOptions& options,
+                         std::shared_ptr<const TransportResponses> responses)
+    : rig_(make_rig(options, std::move(responses), clock_)), camera_(*rig_), projector_(*rig_) {}
 
 std::vector<std::pair<std::string, std::vector<std::byte>>> files_below(
     const std::filesystem::path& directory) {

@@ -14,6 +14,7 @@
 #include "sim/rig.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_projector.h"
+#include "tests/support/simulated_station.h"
 
 namespace opaline::support {
 
@@ -57,7 +58,8 @@ class LogSink : public NullSink {
 /// The tiny station with its devices, on a clock that stands still unless somebody waits.
 class TinyStation {
  public:
-  explicit TinyStation(const sim::RigOptions& options);
+  explicit TinyStation(const sim::RigOptions& options,
+                       std::shared_ptr<const TransportResponses> responses = tiny_responses());
   sim::Rig& rig() { return *rig_; }
   capture::Station station() { return {camera_, projector_, clock_}; }
   ManualClock& clock() { return clock_; }

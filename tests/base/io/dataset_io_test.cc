@@ -133,11 +133,11 @@ TEST(DatasetFile, RefusesANewerVersion) {
   const testing::TemporaryDirectory dir;
   ASSERT_TRUE(write_dataset(system_files(), dir.path(), example()));
   std::string text = *read_text(dir.path() / "dataset.json");
-  text.replace(text.find("\"format\": 2"), 11, "\"format\": 3");
+  text.replace(text.find("\"format\": 3"), 11, "\"format\": 4");
   std::ofstream(dir.path() / "dataset.json") << text;
   const auto read = read_dataset(dir.path());
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("newer version (format 3"));
+  EXPECT_THAT(read.error().message, HasSubstr("newer version (format 4"));
 }
 
 TEST(DatasetFile, ReadsTheFormatBeforeDirections) {
@@ -146,11 +146,28 @@ TEST(DatasetFile, ReadsTheFormatBeforeDirections) {
   older.view_direction = {};
   ASSERT_TRUE(write_dataset(system_files(), dir.path(), older));
   std::string text = *read_text(dir.path() / "dataset.json");
-  text.replace(text.find("\"format\": 2"), 11, "\"format\": 1");
+  text.replace(text.find("\"format\": 3"), 11, "\"format\": 1");
   std::ofstream(dir.path() / "dataset.json") << text;
   const auto read = read_dataset(dir.path());
   ASSERT_TRUE(read) << read.error().message;
   expect_equal(*read, older);
+}
+
+TEST(DatasetFile, KeepsTheUniformLightApart) {
+  const testing::TemporaryDirectory dir;
+  Dataset set = example();
+  set.uniform = set.illuminations.front();
+  set.uniform->name = "uniform";
+  set.uniform->radiance.samples()[0] = 42.0F;
+  ASSERT_TRUE(write_dataset(system_files(), dir.path(), set));
+  const auto read = read_dataset(dir.path());
+  ASSERT_TRUE(read) << read.error().message;
+  expect_equal(*read, set);
+  ASSERT_TRUE(read->uniform);
+  EXPECT_EQ(read->uniform->name, "uniform");
+  EXPECT_EQ(read->uniform->radiance, set.uniform->radiance);
+  EXPECT_EQ(read->uniform->mask, set.uniform->mask);
+  EXPECT_EQ(read->uniform->irradiance, set.uniform->irradiance);
 }
 
 TEST(DatasetFile, SurvivesAnySidecar) {
