@@ -101,6 +101,17 @@ void judge(const ColorError& error, StepRecord& record) {
   record.gates.push_back({"largest colour difference", error.most, kMostOff, "CIEDE2000", remedy});
 }
 
+// As the chart is published, and as the correction has it.
+nlohmann::json seen_patches(const ColorCorrection& correction,
+                            const std::vector<CameraRgb>& patches) {
+  nlohmann::json list = nlohmann::json::array();
+  for (std::size_t p = 0; p < patches.size(); ++p)
+    list.push_back({{"patch", kColorChecker[p].name},
+                    {"lab", kColorChecker[p].lab},
+                    {"seen_lab", lab_from_xyz(correction.xyz(patches[p]))}});
+  return list;
+}
+
 // The better of the two models by patches that they did not know.
 Result<void> correct(StepContext& context,
                      const std::vector<FoundChart>& charts,
@@ -122,6 +133,7 @@ Result<void> correct(StepContext& context,
   auto correction = fit_color(chosen, *balance, exposures.front(), colours);
   if (!correction) return correction.error();
   record.values["model"] = to_string(chosen);
+  record.values["patches"] = seen_patches(*correction, exposures.front());
   record.values["white_balance"] = *balance;
   record.values["corners_px"] = charts.front().corners;
   judge(*best, record);

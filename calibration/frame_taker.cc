@@ -94,6 +94,7 @@ Result<Frame> FrameTaker::checked(std::uint64_t pattern,
     return unavailable(
         fmt::format("{} frame: {}", capture::to_string(problem->fault), problem->message));
   }
+  if (watcher_) watcher_(*frame);
   return frame;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "base/events.h"
 #include "base/frame.h"
@@ -51,6 +52,9 @@ class FrameTaker {
   /// Waits on the station's clock.
   Result<void> pause(std::chrono::nanoseconds time, std::stop_token stop) const;
 
+  /// `watcher` is called with every frame that was accepted, before it is returned.
+  void show_frames_to(std::function<void(const Frame&)> watcher) { watcher_ = std::move(watcher); }
+
   const drivers::CameraInfo& camera() const { return camera_; }
   const drivers::ProjectorInfo& projector() const { return projector_; }
   std::chrono::nanoseconds now() const { return station_.clock.now(); }
@@ -84,6 +88,7 @@ class FrameTaker {
   std::optional<capture::FrameCheck> check_;
   std::uint64_t next_pattern_ = 1000;
   std::int64_t dark_frames_ = 0;
+  std::function<void(const Frame&)> watcher_;
 };
 
 }  // namespace opaline::calibration

@@ -9,7 +9,8 @@
 
 #include "calibration/board_finder.h"
 #include "calibration/pair_fit.h"
-#include "calibration/pose_taker.h"
+#include "calibration/posing.h"
+#include "calibration/residuals.h"
 #include "calibration/step.h"
 
 namespace opaline::calibration {
@@ -23,13 +24,6 @@ constexpr double kLeftOut = 0.4;
 constexpr double kFewestPoses = 8.0;
 constexpr double kUncovered = 0.5;
 constexpr double kFocalUnsure = 0.002;
-constexpr std::size_t kEnoughToTell = 6;
-constexpr int kFieldsAcross = 3;
-
-struct Poses {
-  std::vector<BoardView> camera;
-  std::vector<BoardView> projector;
-};
 
 std::array<int, 2> camera_size(const StepContext& context) {
   return {context.taker.camera().width, context.taker.camera().height};
@@ -37,77 +31,6 @@ std::array<int, 2> camera_size(const StepContext& context) {
 
 std::array<int, 2> projector_size(const StepContext& context) {
   return {context.taker.projector().width, context.taker.projector().height};
-}
-
-// Where in the picture the fewest corners are: "upper left".
-std::string emptiest_part(const StepContext& context, const Poses& poses) {
-  std::array<int, std::size_t{kFieldsAcross} * kFieldsAcross> counts{};
-  for (const BoardView& view : poses.camera) {
-    for (const BoardCorner& corner : view.corners) {
-      const auto field = [](double place, int size) {
-        return std::clamp(static_cast<int>(place / size * kFieldsAcross), 0, kFieldsAcross - 1);
-      };
-      const int x = field(corner.pixel.x, camera_size(context)[0]);
-      const int y = field(corner.pixel.y, camera_size(context)[1]);
-      ++counts[static_cast<std::size_t>(y * kFieldsAcross + x)];
-    }
-  }
-  constexpr std::array kNames{"upper left",
-                              "top",
-                              "upper right",
-                              "left",
-                              "middle",
-                              "right",
-                              "lower left",
-                              "bottom",
-                              "lower right"};
-  const auto least = std::ranges::min_element(counts) - counts.begin();
-  return kNames[static_cast<std::size_t>(least)];
-}
-
-// What the operator should know after a pose.
-std::string so_far(const StepContext& context, const Poses& poses, const PosePair& pose) {
-  std::string text =
-      pose.camera.fault.empty()
-          ? fmt::format("{}: {} corners", pose.camera.name, pose.camera.corners.size())
-          : fmt::format("{}: {}", pose.camera.name, pose.camera.fault);
-  if (poses.camera.size() >= kEnoughToTell) {
-    const auto size = camera_size(context);
-    const auto fit =
-        fit_lens(size[0], size[1], context.geometry.board, poses.camera, {}, context.stop);
-    if (fit)
-      text += fmt::format("; camera fits to {:.3f} px, corners in {:.0f} % of its picture",
-                          fit->rms_px,
-                          100.0 * fit->coverage);
-  }
-  return fmt::format(
-      "{}; next: the board towards {}, tilted another way", text, emptiest_part(context, poses));
-}
-
-Result<Poses> take_poses(StepContext& context, const Brightness& brightness) {
-  Poses poses;
-  const int count = context.geometry.poses;
-  for (int i = 0; i < count; ++i) {
-    const std::string name = fmt::format("pose {}", i + 1);
-    context.progress(
-        static_cast<double>(i) / count,
-        fmt::format(
-            "{} of {}: move the board while the lamp is dark, then hold it still", name, count));
-    if (auto rested = context.taker.rest(context.geometry.time_to_move, context.stop); !rested)
-      return rested.error();
-    auto pose = take_pose(context, name, brightness);
-    if (!pose) return pose.error().in(name);
-    poses.camera.push_back(pose->camera);
-    poses.projector.push_back(pose->projector);
-    auto noted = context.events.fact("pose.taken",
-                                     {{"pose", i + 1},
-                                      {"corners", pose->camera.corners.size()},
-                                      {"blur_px", pose->camera.blur_px},
-                                      {"fault", pose->camera.fault},
-                                      {"message", so_far(context, poses, *pose)}});
-    if (!noted) return noted.error();
-  }
-  return poses;
 }
 
 std::string left_out(const PairFit& fit) {
@@ -164,13 +87,20 @@ std::vector<Gate> geometry_gates(const PairFit& fit, double length_error) {
        "nothing but the board may move; " + why}};
 }
 
-nlohmann::json values_of(const PairFit& fit, double length_mm, double length_error) {
+nlohmann::json values_of(const PairFit& fit,
+                         const Board& board,
+                         double length_mm,
+                         double length_error) {
   nlohmann::json poses = nlohmann::json::array();
   for (const ViewFit& view : fit.views) {
+    const PoseLie lie = view.kept() ? lie_of(view.camera_from_board, board) : PoseLie{};
     poses.push_back({{"name", view.name},
                      {"rms_px", view.rms_px},
                      {"blur_px", view.blur_px},
                      {"corners", view.corners},
+                     {"right_deg", lie.right_deg},
+                     {"down_deg", lie.down_deg},
+                     {"distance_mm", lie.distance_mm},
                      {"left_out", view.reason}});
   }
   const Vec3 place = fit.joint_projector.centre();
@@ -234,7 +164,8 @@ Result<StepRecord> geometry(StepContext& context) {
   const double length_mm = mean_length(*fit, board, *poses);
   const double error = length_mm / board.known_length_mm - 1.0;
   for (Gate& gate : geometry_gates(*fit, error)) record.gates.push_back(std::move(gate));
-  record.values = values_of(*fit, length_mm, error);
+  record.values = values_of(*fit, board, length_mm, error);
+  record.values["residuals"] = residuals_of(*fit, board, poses->camera, poses->projector);
   context.record.measured.camera_lens = MeasuredLens{fit->joint_camera, fit->deviation[0]};
   context.record.measured.projector_lens = MeasuredLens{fit->joint_projector, fit->deviation[1]};
   return record;

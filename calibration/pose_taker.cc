@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calibration/board_finder.h"
 
@@ -55,20 +56,6 @@ Result<White> take_white(StepContext& context, const std::string& name, const Br
   }
 }
 
-// The median distance of corners that both have, px.
-double moved_by(const BoardView& before, const BoardView& after) {
-  std::vector<double> distances;
-  for (const BoardCorner& corner : before.corners) {
-    const auto same = std::ranges::find(after.corners, corner.id, &BoardCorner::id);
-    if (same == after.corners.end()) continue;
-    distances.push_back(std::hypot(same->pixel.x - corner.pixel.x, same->pixel.y - corner.pixel.y));
-  }
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::ranges::nth_element(distances, middle);
-  return *middle;
-}
-
 PhasePlan plan_of(const StepContext& context, std::uint8_t white) {
   PhasePlan plan;
   plan.width = context.taker.projector().width;
@@ -100,15 +87,29 @@ Result<ProjectorMap> take_patterns(StepContext& context,
 
 }  // namespace
 
+std::optional<double> corners_moved(const BoardView& before, const BoardView& after) {
+  std::vector<double> distances;
+  for (const BoardCorner& corner : before.corners) {
+    const auto same = std::ranges::find(after.corners, corner.id, &BoardCorner::id);
+    if (same == after.corners.end()) continue;
+    distances.push_back(std::hypot(same->pixel.x - corner.pixel.x, same->pixel.y - corner.pixel.y));
+  }
+  if (distances.empty()) return std::nullopt;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::ranges::nth_element(distances, middle);
+  return *middle;
+}
+
 Result<PosePair> take_pose(StepContext& context,
                            const std::string& name,
                            const Brightness& brightness) {
   const Board& board = context.geometry.board;
   const auto white = take_white(context, name, brightness);
   if (!white) return white.error();
-  auto before = find_board(grey_of(white->frame.pixels), board, name);
+  Image<std::uint8_t> grey = grey_of(white->frame.pixels);
+  auto before = find_board(grey, board, name);
   if (!before) return before.error();
-  if (!before->fault.empty()) return PosePair{*before, *before};
+  if (!before->fault.empty()) return PosePair{*before, *before, std::move(grey)};
   const auto map = take_patterns(context, name, white->code, brightness.turns);
   if (!map) return map.error();
   const auto last = context.taker.pictured(
@@ -116,12 +117,13 @@ Result<PosePair> take_pose(StepContext& context,
   if (!last) return last.error();
   const auto after = find_board(grey_of(last->pixels), board, name);
   if (!after) return after.error();
-  auto camera = find_board(grey_of(map->mean), board, name);
+  grey = grey_of(map->mean);
+  auto camera = find_board(grey, board, name);
   if (!camera) return camera.error();
-  const double moved = moved_by(*before, *after);
+  const double moved = corners_moved(*before, *after).value_or(0.0);
   if (!after->fault.empty() || moved > kMayMove)
     camera->fault = fmt::format("moved board: by {:.2f} px while the patterns were shown", moved);
-  PosePair pose{*std::move(camera), {}};
+  PosePair pose{*std::move(camera), {}, std::move(grey)};
   pose.projector = projector_view(*map, pose.camera, board);
   return pose;
 }

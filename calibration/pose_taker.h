@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/image.h"
 #include "calibration/board.h"
 #include "calibration/phase_code.h"
 #include "calibration/step.h"
@@ -13,7 +16,11 @@ namespace opaline::calibration {
 struct PosePair {
   BoardView camera;
   BoardView projector;
+  Image<std::uint8_t> grey;  ///< in which the camera's corners were found
 };
+
+/// The median distance of corners that both have, px; none without such corners.
+std::optional<double> corners_moved(const BoardView& before, const BoardView& after);
 
 /// Photographs one pose: white light first, then all phase patterns, then white again. The corners are those of the mean of all patterns,
 /// which has the least noise; when they are elsewhere in the last white frame than in the first, the pose is `moved`. The light is dimmed until

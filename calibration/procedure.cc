@@ -124,7 +124,10 @@ Result<void> run_procedure(Record& record,
   const auto taker = FrameTaker::create(station, events);
   if (!taker) return taker.error();
   if (auto same = same_devices(record, **taker); !same) return same;
-  StepContext context{**taker, given, record, events, stop, {}, options.geometry};
+  if (options.attendant != nullptr)
+    (*taker)->show_frames_to([&](const Frame& frame) { options.attendant->saw(frame); });
+  StepContext context{
+      **taker, given, record, events, stop, {}, options.geometry, options.attendant};
   for (std::size_t i = 0; i < kDo.size(); ++i) {
     if (!is_part(i, options.geometry) || !is_due(record, i, only)) continue;
     context.step = name_of_step(i);

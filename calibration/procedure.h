@@ -8,6 +8,7 @@
 
 #include "base/events.h"
 #include "base/result.h"
+#include "calibration/attendant.h"
 #include "calibration/geometry_options.h"
 #include "calibration/record.h"
 #include "capture/station.h"
@@ -18,6 +19,7 @@ namespace opaline::calibration {
 struct ProcedureOptions {
   std::optional<std::string> only;  ///< one step; those before it must have been accepted
   GeometryOptions geometry = {};    ///< without a board there is no such step
+  Attendant* attendant = nullptr;   ///< outlives the procedure; perhaps nobody
 };
 
 /// Keeps the record on disk after each step.
@@ -26,7 +28,7 @@ using Keep = std::function<Result<void>(const Record&)>;
 /// Takes a record through its steps in order. Steps accepted already are not done again, but the warm-up, without which none
 /// of the others counts, is always; the first one refused ends the procedure, for nothing after it could be believed.
 ///
-/// Facts: step.finished {step, accepted, message}, and frame.retaken. Progress: by step.
+/// Facts: step.finished {step, accepted, message}, pose.taken (posing.h), and frame.retaken. Progress: by step.
 /// Errors: kInvalidArgument when `only` lacks a step before it, or a board, or the devices are not those of the record; and what the
 /// devices return. A gate that fails is not an error: see Record::state().
 Result<void> run_procedure(Record& record,

@@ -9,6 +9,7 @@
 #include "base/events.h"
 #include "base/frame.h"
 #include "base/result.h"
+#include "calibration/attendant.h"
 #include "calibration/frame_taker.h"
 #include "calibration/geometry_options.h"
 #include "calibration/record.h"
@@ -25,6 +26,7 @@ struct StepContext {
   std::stop_token stop;
   std::string_view step = {};
   GeometryOptions geometry = {};
+  Attendant* attendant = nullptr;  ///< perhaps nobody
 
   void progress(double fraction, std::string_view doing) const;
 };

@@ -123,6 +123,20 @@ Result<void> Store::activate(int version) const {
   return write_whole(files_, file, out.dump(2) + "\n");
 }
 
+Result<std::optional<int>> Store::used_before(int version) const {
+  const auto text = read_text(directory_ / "active.json");
+  if (!text && text.error().code == ErrorCode::kNotFound) return std::optional<int>();
+  if (!text) return text.error();
+  const json in = json::parse(*text, nullptr, false);
+  std::optional<int> newest;
+  const json history = in.is_object() ? in.value("history", json::array()) : json::array();
+  for (const json& entry : history) {
+    const int used = entry.is_object() ? entry.value("version", 0) : 0;
+    if (used > 0 && used < version) newest = std::max(newest.value_or(0), used);
+  }
+  return newest;
+}
+
 std::vector<std::string> stations_in(const fs::path& root) {
   std::vector<std::string> found;
   std::error_code error;

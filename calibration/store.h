@@ -34,6 +34,8 @@ class Store {
   Result<std::optional<Record>> read_active() const;
   /// Lets sessions use this one from now on. Errors: kInvalidArgument for one that was not accepted, with what it failed.
   Result<void> activate(int version) const;
+  /// The newest version below this one that sessions have used at some time; none where there is none.
+  Result<std::optional<int>> used_before(int version) const;
   const std::filesystem::path& directory() const { return directory_; }
 
  private:
