@@ -11,6 +11,7 @@
 #include "config/agreement.h"
 #include "config/block_fields.h"
 #include "config/quality.h"
+#include "config/rig_text.h"
 
 namespace opaline::config {
 namespace {
@@ -368,13 +369,17 @@ Result<SessionConfig> load_session(const fs::path& session_file) {
   return accept(*std::move(loaded));
 }
 
+Result<RigConfig> parse_rig(const Source& source) {
+  RigConfig rig;
+  const auto problems = read_toml(source, [&](Fields& f) { visit_rig(f, rig, true); });
+  if (!problems.empty()) return invalid_argument(to_string(problems));
+  return rig;
+}
+
 Result<RigConfig> load_rig(const fs::path& rig_file) {
   const auto source = read_source(rig_file);
   if (!source) return source.error();
-  RigConfig rig;
-  const auto problems = read_toml(*source, [&](Fields& f) { visit_rig(f, rig, true); });
-  if (!problems.empty()) return invalid_argument(to_string(problems));
-  return rig;
+  return parse_rig(*source);
 }
 
 Result<std::vector<Problem>> check(const fs::path& file) {

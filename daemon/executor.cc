@@ -72,13 +72,17 @@ class SpawnSettings {
 
 Result<std::unique_ptr<JobProcess>> LocalExecutor::start(const JobCommand& command) {
   const std::string program = (programs_ / ("opaline-" + command.stage)).string();
-  const std::string directory = command.directory.string();
+  std::vector<std::string> words = command.arguments;
+  if (words.empty()) words.push_back(command.directory.string());
+  words.insert(words.begin(), program);
+  std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
   const SpawnSettings settings(command.directory / "job.log");
-  char* const arguments[] = {
-      const_cast<char*>(program.c_str()), const_cast<char*>(directory.c_str()), nullptr};
   pid_t pid = 0;
   const int code = ::posix_spawn(
-      &pid, program.c_str(), &settings.actions, &settings.attributes, arguments, environ);
+      &pid, program.c_str(), &settings.actions, &settings.attributes, pointers.data(), environ);
   if (code != 0) {
     std::string message =
         fmt::format("cannot start {}: {}", program, std::generic_category().message(code));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 
@@ -13,8 +14,9 @@ namespace opaline::daemon {
 
 /// A stage's program to be run on a session.
 struct JobCommand {
-  std::string stage;                ///< "capture" runs opaline-capture
-  std::filesystem::path directory;  ///< the session's
+  std::string stage;                        ///< "capture" runs opaline-capture
+  std::filesystem::path directory;          ///< the session's, where job.log is
+  std::vector<std::string> arguments = {};  ///< empty: the directory
 };
 
 /// A job that was started here. Letting go of it leaves the job running.

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 
+#include "base/files.h"
 #include "base/log.h"
 #include "daemon/executor.h"
 #include "daemon/http_server.h"
@@ -15,6 +16,7 @@
 #include "daemon/routes/events.h"
 #include "daemon/routes/sessions.h"
 #include "daemon/routes/status.h"
+#include "daemon/routes/viewfinders.h"
 #include "daemon/runtime_paths.h"
 #include "daemon/session_rules.h"
 #include "daemon/station.h"
@@ -93,6 +95,16 @@ Result<void> serve(Arguments& arguments) {
   add_event_routes(router, **station);
   add_artefact_routes(router, **station);
   add_status_routes(router, **station);
+  const auto live = live_root();
+  if (!live) return live.error();
+  LocalExecutor executor(arguments.station.programs);
+  Viewfinders viewfinders(
+      {*live,
+       station_of,
+       [&](const std::filesystem::path& lock) { return (*station)->user_of(lock); }},
+      executor,
+      system_files());
+  add_viewfinder_routes(router, viewfinders);
   const auto server = HttpServer::listen(
       arguments.http, [&](const HttpRequest& request) { return router.handle(request); });
   if (!server) return server.error();

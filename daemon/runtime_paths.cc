@@ -50,6 +50,12 @@ Result<fs::path> default_socket() {
   return *directory / "opalined.sock";
 }
 
+Result<fs::path> live_root() {
+  const Result<fs::path> directory = runtime_directory();
+  if (!directory) return directory.error();
+  return *directory / "live";
+}
+
 fs::path default_sessions() { return user_data("OPALINE_SESSIONS", "sessions"); }
 
 fs::path default_calibrations() { return user_data("OPALINE_CALIBRATIONS", "calibrations"); }

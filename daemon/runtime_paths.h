@@ -13,6 +13,9 @@ Result<std::filesystem::path> runtime_directory();
 /// Where opalined listens and opaline asks: $OPALINE_SOCKET, or opalined.sock in the above.
 Result<std::filesystem::path> default_socket();
 
+/// Where stations show what their cameras see just now (daemon/live_view.h): live in the above.
+Result<std::filesystem::path> live_root();
+
 /// Where sessions lie unless told otherwise: $OPALINE_SESSIONS, $XDG_DATA_HOME/opaline/sessions or
 /// ~/.local/share/opaline/sessions.
 std::filesystem::path default_sessions();

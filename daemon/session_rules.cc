@@ -5,6 +5,7 @@
 #include <array>
 
 #include "base/log.h"
+#include "config/rig_text.h"
 #include "config/session_config.h"
 #include "daemon/jobs/station_lock.h"
 
@@ -41,6 +42,15 @@ Result<SessionDirectory::Contents> contents_of(const NewSession& wish) {
                                     wish.session_toml,
                                     wish.rig_toml,
                                     config::to_toml(*session)};
+}
+
+Result<std::string> station_of(const std::string& rig_toml, bool same_user) {
+  const Result<config::RigConfig> rig = config::parse_rig({"rig.toml", rig_toml, {}});
+  if (!rig) return rig.error();
+  if (!same_user) {
+    if (auto refused = refuse_named_files(*rig); !refused) return refused.error();
+  }
+  return rig->station;
 }
 
 std::filesystem::path station_lock_of(const SessionDirectory& session) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "base/result.h"
 #include "base/session_directory.h"
@@ -13,6 +14,10 @@ namespace opaline::daemon {
 /// only by this user's own socket; over TCP they are kInvalidArgument.
 /// Errors: kInvalidArgument with every problem of the texts, one a line.
 Result<SessionDirectory::Contents> contents_of(const NewSession& wish);
+
+/// The name of the station that a rig file's text names, once all of the text is right. No file that it names may be one of
+/// another user's wishes: as contents_of().
+Result<std::string> station_of(const std::string& rig_toml, bool same_user);
 
 /// The lock of the station that a session's rig names; empty when its configuration is unreadable.
 std::filesystem::path station_lock_of(const SessionDirectory& session);

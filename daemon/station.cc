@@ -151,6 +151,17 @@ void Station::refine(SessionSnapshot& snapshot) const {
   }
 }
 
+std::string Station::user_of(const fs::path& station_lock) const {
+  for (const SessionSnapshot& snapshot : active()) {
+    const bool runs =
+        snapshot.state == SessionState::kRunning || snapshot.state == SessionState::kCancelling;
+    if (!runs || snapshot.stage != kStationStage) continue;
+    const Result<SessionDirectory> session = directory(snapshot.id);
+    if (session && rules_.station_lock(*session) == station_lock) return snapshot.id;
+  }
+  return {};
+}
+
 Result<SessionSnapshot> Station::cancel(const std::string& id) {
   Result<SessionSnapshot> snapshot = session(id);
   if (!snapshot) return snapshot;

@@ -57,6 +57,8 @@ class Station {
   /// kInvalidArgument for one of a newer version.
   Result<SessionDirectory> directory(const std::string& id) const;
   const std::filesystem::path& root() const { return options_.root; }
+  /// The session that has the devices behind a station's lock just now; empty when none of ours does.
+  std::string user_of(const std::filesystem::path& station_lock) const;
 
  private:
   Station(Options options, Rules rules, FileLock lock, std::unique_ptr<Catalogue> catalogue);

@@ -3,30 +3,36 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
+#include <memory>
 #include <optional>
 #include <ranges>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "base/clock.h"
 #include "base/files.h"
-#include "base/session_directory.h"
+#include "base/io/image_io.h"
 #include "calibration/procedure.h"
 #include "calibration/store.h"
 #include "config/session_config.h"
 #include "daemon/calibrate/calibration_report.h"
+#include "daemon/calibrate/calibration_terminal.h"
+#include "daemon/calibrate/guarded_station.h"
+#include "daemon/calibrate/live_attendant.h"
+#include "daemon/calibrate/pose_picture.h"
 #include "daemon/calibrate/view.h"
 #include "daemon/cli/progress_view.h"
 #include "daemon/cli/terminal.h"
-#include "daemon/driver_table.h"
 #include "daemon/jobs/command_program.h"
-#include "daemon/jobs/guardian.h"
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/station_lock.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
+#include "daemon/live_view.h"
 #include "daemon/runtime_paths.h"
 
 namespace opaline::daemon {
@@ -37,29 +43,21 @@ using calibration::Record;
 using calibration::RecordState;
 using calibration::Store;
 
+constexpr std::size_t kLargestPose = 64u << 20;
+constexpr int kThumbnailWidth = 240;
+constexpr int kThumbnailsAcross = 4;
+
 struct Arguments {
   fs::path rig;
   std::string step;
   bool resume = false;
-  fs::path view;   ///< a viewfinder instead of a calibration
-  int frames = 0;  ///< of it; 0: until it is stopped
+  bool attended = false;  ///< a person holds the board, also before a simulated station
+  fs::path view;          ///< a viewfinder instead of a calibration, with files here
+  bool live = false;      ///< a viewfinder without files
+  int frames = 0;         ///< of it; 0: until it is stopped
+  int while_watched =
+      0;  ///< seconds without anybody looking at the live view that end it; 0: none do
   fs::path calibrations = default_calibrations();
-};
-
-/// Shows steps as a session's progress is shown.
-class TerminalSink : public EventSink {
- public:
-  explicit TerminalSink(ProgressView& view) : view_(view) {}
-  void progress(const Progress& p) override {
-    view_.on_event("progress", {{"step", p.step}, {"fraction", p.fraction}, {"detail", p.detail}});
-  }
-  Result<void> fact(std::string_view /*type*/, const nlohmann::json& data) override {
-    view_.say(data.value("message", data.dump()));
-    return ok();
-  }
-
- private:
-  ProgressView& view_;
 };
 
 /// The newest one that is neither finished nor older than the active one's successor.
@@ -98,60 +96,56 @@ Result<Record> record_to_fill(const Store& store,
   return record;
 }
 
-/// The version's own directory, in which the devices' helpers find the rig's configuration.
-Result<fs::path> make_place(const fs::path& directory,
-                            const config::RigConfig& rig,
-                            const std::string& rig_text) {
-  std::error_code none;
-  if (fs::exists(directory / "session.json", none)) return directory;
-  config::SessionConfig session;
-  session.name = "calibration";
-  session.rig = rig;
-  const auto made = SessionDirectory::create(
-      system_files(), directory, {"calibration", "", rig_text, config::to_toml(session)});
-  if (!made) return made.error();
-  return directory;
+/// Pictures for the daemon's clients; without a place for them a calibration does without.
+std::unique_ptr<LiveView> live_view(const std::string& station) {
+  const auto root = live_root();
+  auto live = root ? LiveView::create(system_files(), live_directory(*root, station))
+                   : Result<std::unique_ptr<LiveView>>(root.error());
+  if (live) return *std::move(live);
+  fmt::print(stderr, "opaline-calibrate: no live view: {}\n", live.error().message);
+  return nullptr;
 }
 
-using WithStation = std::function<Result<void>(const capture::Station&, std::stop_token)>;
+/// Black and clipping as calibrated last, or as the rig file has them.
+capture::StationCalibration believed(const config::RigConfig& rig, const Store& store) {
+  const auto active = store.read_active();
+  if (active && *active) return calibration::with_measured(rig.calibration, (*active)->measured);
+  return rig.calibration;
+}
 
-/// Opens the rig's devices, under a guardian, for what is to be done with them.
-Result<void> with_station(const Arguments& arguments,
-                          const config::RigConfig& rig,
-                          const fs::path& directory,
-                          EventSink& events,
-                          const std::stop_token& asked,
-                          const WithStation& work) {
-  const auto text = read_text(arguments.rig);
-  if (!text) return text.error();
-  const auto place = make_place(directory, rig, *text);
-  if (!place) return place.error();
-  const auto devices = StationDevices::create(rig, *place, events, asked);
-  if (!devices) return devices.error();
-  const auto program = program_beside("opaline-guardian");
-  if (!program) return program.error();
-  const auto guardian = Guardian::start(*program, *place, asked);
-  if (!guardian) return guardian.error();
-  std::stop_source stop;
-  const auto request = [&stop] { stop.request_stop(); };
-  const std::stop_callback on_signal(asked, request);
-  const std::stop_callback unguarded((*guardian)->death(), request);
-  auto done = work((*devices)->station(), stop.get_token());
-  if ((*guardian)->death().stop_requested())
-    return unavailable("the guardian died, and without one no light stays on");
-  return done;
+LiveAttendant::Options attendant_options(const Arguments& arguments,
+                                         const config::RigConfig& rig,
+                                         const Store& store,
+                                         LiveView* live,
+                                         int version) {
+  const auto camera = believed(rig, store).camera;
+  return {live,
+          store.directory_of(version) / "poses",
+          version,
+          arguments.attended || !rig.is_simulated(),
+          camera.black_level,
+          capture::clipping_code(camera)};
 }
 
 Result<void> calibrate(Record& record,
                        const Arguments& arguments,
                        const config::RigConfig& rig,
                        const Store& store,
-                       EventSink& events,
+                       ProgressView& view,
                        const std::stop_token& asked) {
+  const std::unique_ptr<LiveView> live = live_view(rig.station);
+  LiveAttendant attendant(attendant_options(arguments, rig, store, live.get(), record.version),
+                          system_files());
+  CalibrationTerminal events(view, &attendant, terminal_options().terminal);
   calibration::ProcedureOptions options;
   if (!arguments.step.empty()) options.only = arguments.step;
   options.geometry = rig.geometry;
-  return with_station(arguments,
+  options.attendant = &attendant;
+  if (rig.geometry.has_board() && attendant.holds_the_board())
+    view.say(
+        "a pose is taken once the board has been moved and stands still; Enter takes it as it "
+        "is, \"enough\" ends the poses");
+  return with_station(arguments.rig,
                       rig,
                       store.directory_of(record.version),
                       events,
@@ -168,28 +162,30 @@ Result<void> calibrate(Record& record,
                       });
 }
 
-/// Black and clipping as calibrated last, or as the rig file has them.
 Result<void> look(const Arguments& arguments, const config::RigConfig& rig, const Store& store) {
   std::stop_source stop;
   const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
   if (!signals) return signals.error();
-  const auto active = store.read_active();
-  auto known = rig.calibration;
-  if (active && *active) known = calibration::with_measured(known, (*active)->measured);
-  const ViewOptions options{fs::absolute(arguments.view),
-                            arguments.frames,
-                            known.camera.black_level,
-                            capture::clipping_code(known.camera)};
-  fmt::print("{}\n", (options.directory / "view.png").string());
+  const std::unique_ptr<LiveView> live = live_view(rig.station);
+  const auto camera = believed(rig, store).camera;
+  ViewOptions options;
+  if (!arguments.view.empty()) options.directory = fs::absolute(arguments.view);
+  options.live = live.get();
+  if (arguments.while_watched > 0) options.while_watched.emplace(arguments.while_watched);
+  options.frames = arguments.frames;
+  options.black = camera.black_level;
+  options.clipping = capture::clipping_code(camera);
+  const fs::path shown = options.directory.empty() && live ? live->directory() : options.directory;
+  fmt::print("{}\n", (shown / "view.png").string());
   NullSink events;
   const auto say = [](const std::string& line) {
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const fs::path place = options.directory / ".station";  // of another rig, perhaps
+  const fs::path place = shown / ".station";  // of another rig, perhaps
   std::error_code none;
   fs::remove_all(place, none);
-  return with_station(arguments,
+  return with_station(arguments.rig,
                       rig,
                       place,
                       events,
@@ -236,6 +232,26 @@ Result<void> conclude(const Record& record, const Store& store, const std::strin
   return ok();
 }
 
+/// The pictures of its poses on one sheet; nothing where there are none.
+std::vector<std::byte> poses_sheet(const fs::path& poses) {
+  std::vector<Image<std::uint8_t>> pictures;
+  std::vector<fs::path> files;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(poses, none)) files.push_back(entry.path());
+  std::ranges::sort(files);
+  for (const fs::path& file : files) {
+    const auto bytes = read_bytes(file, kLargestPose);
+    const auto image = bytes ? decode_image(*bytes) : Result<ImageFile>(bytes.error());
+    const auto* pixels = image ? std::get_if<Image<std::uint8_t>>(&image->pixels) : nullptr;
+    if (pixels != nullptr && pixels->channels() == 3)
+      pictures.push_back(shrunk(*pixels, kThumbnailWidth));
+  }
+  const Image<std::uint8_t> sheet = contact_sheet(pictures, kThumbnailsAcross);
+  if (sheet.empty()) return {};
+  auto png = encode_image({sheet, {}, {}}, ImageFormat::kPng);
+  return png ? *std::move(png) : std::vector<std::byte>();
+}
+
 /// Beside the calibration; compared with the active one, or with the one before where it is that itself.
 Result<void> write_report(const Record& record, const Store& store) {
   std::optional<Record> before;
@@ -245,7 +261,8 @@ Result<void> write_report(const Record& record, const Store& store) {
     if (older && older->state() == RecordState::kAccepted) before = *std::move(older);
   }
   const fs::path path = store.directory_of(record.version) / "report.html";
-  const std::string page = calibration_page(record, before, {});
+  const std::string page = calibration_page(
+      record, before, poses_sheet(store.directory_of(record.version) / "poses"), {});
   if (auto written = write_whole(system_files(), path, page); !written) return written;
   fmt::print("{}\n", path.string());
   return ok();
@@ -260,7 +277,7 @@ Result<void> run(const Arguments& arguments) {
   const auto lock = lock_station(rig->station);
   if (!lock) return lock.error();
   const Store store(system_files(), fs::absolute(arguments.calibrations), rig->station);
-  if (!arguments.view.empty()) return look(arguments, *rig, store);
+  if (arguments.live || !arguments.view.empty()) return look(arguments, *rig, store);
   auto record = record_to_fill(store, arguments, rig->station);
   if (!record) return record.error();
   std::stop_source stop;
@@ -268,9 +285,8 @@ Result<void> run(const Arguments& arguments) {
   if (!signals) return signals.error();
   const SystemClock clock;
   ProgressView view(terminal_options(), clock);
-  TerminalSink events(view);
   view.say(fmt::format("calibration {} of station {}", record->version, record->station));
-  auto done = calibrate(*record, arguments, *rig, store, events, stop.get_token());
+  auto done = calibrate(*record, arguments, *rig, store, view, stop.get_token());
   if (!done && done.error().code == ErrorCode::kCancelled)
     return cancelled(fmt::format("stopped; go on with \"opaline calibrate --resume {}\"",
                                  arguments.rig.string()));
@@ -294,9 +310,19 @@ int program(int argc, char** argv) {
       ->capture_default_str();
   auto* const view = app.add_option(
       "--view", arguments.view, "A viewfinder instead: view.png and view.json in this directory");
-  app.add_option("--frames", arguments.frames, "With --view: end after so many; 0: Ctrl-C ends it")
-      ->check(CLI::NonNegativeNumber)
-      ->needs(view);
+  auto* const live = app.add_flag(
+      "--live", arguments.live, "A viewfinder for the daemon's clients only, without a directory");
+  live->excludes(view);
+  app.add_option(
+         "--frames", arguments.frames, "Of a viewfinder: end after so many; 0: Ctrl-C ends it")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--while-watched",
+                 arguments.while_watched,
+                 "Of a viewfinder: end once nobody has looked at it over HTTP for so many seconds")
+      ->check(CLI::PositiveNumber);
+  app.add_flag("--attended",
+               arguments.attended,
+               "Wait for a person to move the board also before a simulated station");
   app.footer(
       "Ctrl-C stops; --resume goes on after the last step done.\nExit status: 0 done, 1 refused or "
       "failed, 2 bad input, 3 stopped, 4 station busy\n\nExamples:\n"

@@ -82,9 +82,9 @@ std::string response_plot(const Record& record, const std::stop_token& stop) {
   curve.y_label = "light, share of full scale";
   CurvePlot off;
   off.x_label = "share of the code range";
-  Series told{"Debevec and Malik, linearity step", "#27803b", {}, {}, SeriesStyle::kPoints};
+  Series told{"Debevec, Malik", "#27803b", {}, {}, SeriesStyle::kPoints};
   Series used{"in use", "#404040", {}, {}, SeriesStyle::kLine};
-  Series residual{"Debevec and Malik", "#27803b", {}, {}, SeriesStyle::kLinePoints};
+  Series residual{"Debevec, Malik", "#27803b", {}, {}, SeriesStyle::kLinePoints};
   for (std::size_t i = 0; i < table.size(); ++i) {
     const double f = static_cast<double>(i) / static_cast<double>(table.size() - 1);
     const double s = table[i].get<double>();
@@ -99,7 +99,10 @@ std::string response_plot(const Record& record, const std::stop_token& stop) {
   off.y_label = "off the response in use, % of full scale";
   curve.series = {std::move(told), std::move(used)};
   off.series = {std::move(residual)};
-  return figure(curve, "response", "Response", stop) +
+  return figure(curve,
+                "response",
+                "Response, in the linearity step by Debevec and Malik, and as in use",
+                stop) +
          figure(off, "response_residual", "What the stack says, less the response in use", stop);
 }
 
@@ -177,6 +180,7 @@ std::string gate_plot(const Record& record,
     }
   }
   if (plot.groups.empty()) return {};
+  plot.height = 480;
   plot.level = 100.0;
   plot.level_title = "limit";
   if (before) plot.series.push_back(std::move(then));

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "daemon/calibrate/calibration_plots.h"
+#include "daemon/calibrate/geometry_section.h"
+#include "daemon/calibrate/patch_swatches.h"
 #include "daemon/report/html.h"
 
 namespace opaline::daemon {
@@ -95,16 +97,19 @@ std::string filled(std::string_view id, std::string_view title, const std::strin
 
 std::string calibration_page(const Record& record,
                              const std::optional<Record>& before,
+                             std::span<const std::byte> poses_png,
                              const std::stop_token& stop) {
-  std::string body = summary(record);
+  const std::string title = fmt::format("Calibration {} of {}", record.version, record.station);
+  std::string body = fmt::format("<h1>{}</h1>\n", html::escaped(title)) + summary(record);
   body += html::section("drift", "Measured, and drift", drift(record, before));
   body += html::section("gates", "Gates", gate_plot(record, before, stop) + gates_of(record));
   body += filled("dark", "Dark", dark_map_plot(record, stop));
   body += filled("response", "Response", response_plot(record, stop));
   body += filled("noise", "Noise", photon_transfer_plot(record, stop));
   body += filled("exposures", "Exposure times", exposure_plot(record, stop));
-  body += filled("colour", "Colour", patch_plot(record, stop));
-  return html::page(fmt::format("Calibration {} of {}", record.version, record.station), body);
+  body += filled("geometry", "Lenses", geometry_section(record, before, poses_png, stop));
+  body += filled("colour", "Colour", patch_swatches(record) + patch_plot(record, stop));
+  return html::page(title, body);
 }
 
 }  // namespace opaline::daemon

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "calibration/store.h"
@@ -58,21 +61,53 @@ std::string worst_of(const Record& record) {
   return text;
 }
 
+// What fits on a line; the report draws the rest.
+std::string shown_value(const nlohmann::json& value) {
+  constexpr std::size_t kLongest = 120;
+  if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (text.size() <= kLongest || value.is_string()) return text;
+  return fmt::format("{} values, in calibration.json and report.html", value.size());
+}
+
 void print_step(const StepRecord& step) {
   fmt::print("\n{} {}  {}\n", step.step, step.accepted() ? "accepted" : "REFUSED", step.finished);
   for (const Gate& gate : step.gates) {
-    fmt::print("  {} {:<30} {:<10.4g} at most {:.4g} {}\n",
-               gate.passed() ? " " : "!",
-               gate.name,
-               gate.value,
-               gate.limit,
-               gate.unit);
+    const char* const mark = gate.passed() ? " " : "!";
+    if (gate.unit.empty()) {  // yes or no
+      fmt::print("  {} {:<36} {}\n", mark, gate.name, gate.passed() ? "no" : "yes");
+    } else {
+      fmt::print("  {} {:<36} {:<10.4g} at most {:.4g} {}\n",
+                 mark,
+                 gate.name,
+                 gate.value,
+                 gate.limit,
+                 gate.unit);
+    }
     if (!gate.passed()) fmt::print("      {}\n", gate.remedy);
   }
-  for (const auto& [key, value] : step.values.items()) {
-    const std::string text = value.dump();
-    fmt::print("    {} = {}\n", key, text.size() > 160 ? text.substr(0, 157) + "..." : text);
-  }
+  for (const auto& [key, value] : step.values.items())
+    fmt::print("    {} = {}\n", key, shown_value(value));
+}
+
+// Of a figure that was 0 a share says nothing.
+std::string change_of(double before, double after) {
+  return before == 0.0 ? fmt::format("{:+.3g}", after)
+                       : fmt::format("{:+.2f} %", 100.0 * (after / before - 1.0));
+}
+
+void put_lens(std::map<std::string, double>& figures,
+              const char* name,
+              const std::optional<calibration::MeasuredLens>& lens) {
+  if (!lens) return;
+  const CameraModel& model = lens->model;
+  figures[fmt::format("{} fx, px", name)] = model.fx;
+  figures[fmt::format("{} fy, px", name)] = model.fy;
+  figures[fmt::format("{} cx, px", name)] = model.cx;
+  figures[fmt::format("{} cy, px", name)] = model.cy;
+  constexpr std::array<const char*, 5> kTerms{"k1", "k2", "p1", "p2", "k3"};
+  for (std::size_t i = 0; i < kTerms.size(); ++i)
+    figures[fmt::format("{} {}", name, kTerms[i])] = model.distortion[i];
 }
 
 // Every number of a record, by name.
@@ -93,6 +128,8 @@ std::map<std::string, double> figures_of(const Record& record) {
   put("gain, electrons per code", m.gain_electrons_per_code);
   put("read noise, electrons", m.read_noise_electrons);
   put("projector gamma", m.projector_gamma);
+  put_lens(figures, "camera lens", m.camera_lens);
+  put_lens(figures, "projector lens", m.projector_lens);
   return figures;
 }
 
@@ -143,7 +180,11 @@ Result<void> show_calibration(const CalibrationPlace& place, int version) {
              record->projector.width,
              record->projector.height);
   for (const StepRecord& step : record->steps) print_step(step);
-  fmt::print("\nfile {}\n", (store->directory_of(record->version) / "calibration.json").string());
+  const auto directory = store->directory_of(record->version);
+  std::error_code none;
+  fmt::print("\nfile    {}\n", (directory / "calibration.json").string());
+  if (std::filesystem::exists(directory / "report.html", none))
+    fmt::print("report  {}\n", (directory / "report.html").string());
   return ok();
 }
 
@@ -155,6 +196,23 @@ Result<void> activate_calibration(const CalibrationPlace& place, int version) {
   return ok();
 }
 
+Result<void> roll_back_calibration(const CalibrationPlace& place) {
+  const auto store = store_of(place);
+  if (!store) return store.error();
+  const auto active = store->active();
+  if (!active) return active.error();
+  if (!*active) return not_found("none is active: \"opaline calibration list\" has all");
+  const auto before = store->used_before(**active);
+  if (!before) return before.error();
+  if (!*before)
+    return not_found(fmt::format(
+        "nothing to go back to: sessions have used none before calibration {}; \"opaline "
+        "calibration activate VERSION\" takes any accepted one",
+        **active));
+  fmt::print("calibration {} is left, ", **active);
+  return activate_calibration(place, **before);
+}
+
 Result<void> diff_calibrations(const CalibrationPlace& place, int before, int after) {
   const auto store = store_of(place);
   if (!store) return store.error();
@@ -163,20 +221,30 @@ Result<void> diff_calibrations(const CalibrationPlace& place, int before, int af
   const auto fresh = record_of(*store, after);
   if (!fresh) return fresh.error();
   const auto was = figures_of(*old);
-  fmt::print("{:<48} {:>12} {:>12} {:>9}\n",
+  const auto is = figures_of(*fresh);
+  std::set<std::string> names;
+  for (const auto& [name, value] : was) names.insert(name);
+  for (const auto& [name, value] : is) names.insert(name);
+  std::size_t same = 0;
+  fmt::print("{:<48} {:>12} {:>12} {:>10}\n",
              "",
              fmt::format("version {}", old->version),
              fmt::format("version {}", fresh->version),
              "change");
-  for (const auto& [name, value] : figures_of(*fresh)) {
-    const auto found = was.find(name);
-    if (found == was.end()) {
-      fmt::print("{:<48} {:>12} {:>12.5g}\n", name, "", value);
-    } else if (found->second != value) {
-      const double change = 100.0 * (value / found->second - 1.0);
-      fmt::print("{:<48} {:>12.5g} {:>12.5g} {:>+8.2f}%\n", name, found->second, value, change);
+  for (const std::string& name : names) {
+    const auto a = was.find(name);
+    const auto b = is.find(name);
+    if (a != was.end() && b != is.end() && a->second == b->second) {
+      ++same;
+      continue;
     }
+    fmt::print("{:<48} {:>12} {:>12} {:>10}\n",
+               name,
+               a == was.end() ? "-" : fmt::format("{:.5g}", a->second),
+               b == is.end() ? "-" : fmt::format("{:.5g}", b->second),
+               a == was.end() || b == is.end() ? "" : change_of(a->second, b->second));
   }
+  fmt::print("{} figures are the same\n", same);
   return ok();
 }
 

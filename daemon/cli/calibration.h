@@ -19,6 +19,8 @@ struct CalibrationPlace {
 Result<void> list_calibrations(const CalibrationPlace& place);
 Result<void> show_calibration(const CalibrationPlace& place, int version);
 Result<void> activate_calibration(const CalibrationPlace& place, int version);
+/// Activates the newest version below the active one that was active before.
+Result<void> roll_back_calibration(const CalibrationPlace& place);
 Result<void> diff_calibrations(const CalibrationPlace& place, int before, int after);
 
 }  // namespace opaline::daemon

@@ -15,6 +15,7 @@ Error become_calibrate(const std::filesystem::path& programs,
   std::vector<std::string> words{"--calibrations", place.root.string()};
   if (!wish.step.empty()) words.insert(words.end(), {"--step", wish.step});
   if (wish.resume) words.emplace_back("--resume");
+  if (wish.attended) words.emplace_back("--attended");
   if (!wish.view.empty())
     words.insert(words.end(), {"--view", wish.view, "--frames", std::to_string(wish.frames)});
   words.insert(words.end(), {"--", wish.rig});
@@ -41,10 +42,14 @@ void CalibrationCommands::declare_calibrate(CLI::App& app,
   CLI::App* sub = app.add_subcommand(
       "calibrate", "Let a station measure its camera and projector before it measures a sample");
   sub->add_option("RIG", wish_.rig, "rig.toml")->required();
-  sub->add_option("--step",
-                  wish_.step,
-                  "One step only: warm_up, black_level, linearity, radiometric, check; or colour");
+  sub->add_option(
+      "--step",
+      wish_.step,
+      "One step only: warm_up, black_level, linearity, radiometric, geometry, check; or colour");
   sub->add_flag("--resume", wish_.resume, "Go on with the newest unfinished one");
+  sub->add_flag("--attended",
+                wish_.attended,
+                "Wait for a person to move the board also before a simulated station");
   auto* const view = sub->add_option(
       "--view", wish_.view, "A viewfinder instead: view.png and view.json in this directory");
   sub->add_option("--frames", wish_.frames, "With --view: end after so many; 0: Ctrl-C ends it")
@@ -88,6 +93,9 @@ void CalibrationCommands::declare_calibration(CLI::App& app, int& status) {
       ->add_option("VERSION", versions_, "As \"opaline calibration list\" has it")
       ->required()
       ->expected(1);
+  add("rollback", "Use the one again that was in use before", [this] {
+    return roll_back_calibration(place_);
+  });
   add("diff",
       "What changed between two",
       [this] { return diff_calibrations(place_, versions_[0], versions_[1]); })
@@ -96,7 +104,7 @@ void CalibrationCommands::declare_calibration(CLI::App& app, int& status) {
       ->expected(2);
   group->footer(
       "Examples:\n  opaline calibration list\n  opaline calibration show 3\n  opaline calibration "
-      "activate 2      roll back\n  opaline calibration diff 2 3");
+      "rollback\n  opaline calibration activate 2\n  opaline calibration diff 2 3");
 }
 
 }  // namespace opaline::daemon

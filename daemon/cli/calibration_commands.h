@@ -19,6 +19,7 @@ struct CalibrateWish {
   bool resume = false;
   std::string view;
   int frames = 0;
+  bool attended = false;
 };
 
 /// `opaline calibrate`, which becomes opaline-calibrate, and `opaline calibration`.

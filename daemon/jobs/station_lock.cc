@@ -38,7 +38,8 @@ Result<FileLock> lock_station(std::string_view station) {
   if (station.empty()) return invalid_argument("a station needs a name");
   Result<FileLock> lock = FileLock::acquire(station_lock_path(station));
   if (!lock && lock.error().code == ErrorCode::kBusy) {
-    return busy(fmt::format("station \"{}\" is in use by another session", station));
+    return busy(fmt::format(
+        "station \"{}\" is in use by another session, calibration or viewfinder", station));
   }
   return lock;
 }

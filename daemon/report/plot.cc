@@ -206,7 +206,7 @@ Result<std::string> draw(const CurvePlot& plot, std::string_view name, std::stop
 }
 
 Result<std::string> draw(const BarPlot& plot, std::string_view name, std::stop_token stop) {
-  std::string script = preamble(name, 960, 340) + axes("", plot.y_label);
+  std::string script = preamble(name, 960, plot.height) + axes("", plot.y_label);
   script +=
       "set style data histograms\nset style histogram clustered gap 1\n"
       "set style fill solid 0.85 noborder\nset xtics rotate by -45 nomirror font ',10'\n"

@@ -44,6 +44,7 @@ struct BarPlot {
   std::vector<Series> series;  ///< y only, one value a group
   double level = 0.0;          ///< a dashed line across, when > 0
   std::string level_title;
+  int height = 340;  ///< px, the groups' names, which lean, included
 };
 
 /// One raster drawn in false colours; a value that is no number is left blank.

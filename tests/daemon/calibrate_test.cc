@@ -8,10 +8,12 @@
 #include "base/event_log.h"
 #include "base/files.h"
 #include "base/session_directory.h"
+#include "base/unix_socket.h"
 #include "calibration/store.h"
 #include "config/session_config.h"
 #include "tests/support/named_directory.h"
 #include "tests/support/process.h"
+#include "tests/support/raw_http.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::daemon {
@@ -153,6 +155,40 @@ TEST_F(CalibrateProgram, LeavesWhatItHasWhenItIsInterruptedAndGoesOnFromThere) {
   const Said resumed = calibrate({"--resume"});
   EXPECT_EQ(resumed.status, 0) << resumed.text;
   EXPECT_THAT(resumed.text, Not(HasSubstr("black_level accepted")));
+}
+
+TEST_F(CalibrateProgram, AViewfinderIsServedOverHttpUntilItIsToldToEnd) {
+  const fs::path door = run_ / "opalined.sock";
+  const auto daemon = start(
+      "opalined",
+      {"--sessions", (run_ / "sessions").string(), "--listen", "", "--socket", door.string()});
+  ASSERT_TRUE(testing::eventually([&] { return fs::exists(door); })) << daemon->output();
+  const auto ask = [&](const char* method, const char* target, const std::string& body = "") {
+    const auto connection = connect_unix(door);
+    if (!connection) return testing::HttpReply();
+    return testing::parse_reply(
+        testing::converse(*connection, testing::request_text(method, target, body)));
+  };
+  const auto state = [&] {
+    const auto view = ask("GET", "/v1/viewfinders/demo").json();
+    return view.is_object() ? view.value("state", "") : "";
+  };
+  const std::string rig =
+      nlohmann::json{{"rig", read_text(directory_.path() / "sim-rig.toml").value()}}.dump();
+  ASSERT_EQ(ask("POST", "/v1/viewfinders", rig).status, 202);
+  ASSERT_TRUE(testing::eventually([&] { return state() == "running"; }))
+      << ask("GET", "/v1/viewfinders/demo").body;
+
+  EXPECT_THAT(ask("GET", "/v1/viewfinders/demo/picture").body, HasSubstr("PNG"));
+  EXPECT_GT(ask("GET", "/v1/viewfinders/demo").json().value("coverage", 0.0), 0.1);
+  EXPECT_THAT(ask("POST", "/v1/viewfinders", rig).body, HasSubstr("in use by a viewfinder"));
+  const Said refused = calibrate();
+  EXPECT_EQ(refused.status, 4) << refused.text;
+  EXPECT_THAT(refused.text, HasSubstr("calibration or viewfinder"));
+
+  EXPECT_EQ(ask("DELETE", "/v1/viewfinders/demo").status, 202);
+  EXPECT_TRUE(testing::eventually([&] { return state() == "over"; }))
+      << ask("GET", "/v1/viewfinders/demo").body;
 }
 
 }  // namespace
