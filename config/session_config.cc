@@ -19,7 +19,9 @@ namespace {
 namespace fs = std::filesystem;
 using reconstruct::InverseOptions;
 
-constexpr std::array<std::string_view, 2> kSourceNames{"collimated", "surface"};
+/// How light enters, as the file has it.
+enum class LightEntry : std::uint8_t { kAuto, kCollimated, kSurface };
+constexpr std::array<std::string_view, 3> kSourceNames{"auto", "collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
 constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
 constexpr std::array<std::string_view, 2> kCameraNames{"refracted_ray", "surface"};
@@ -127,7 +129,13 @@ void visit_reduction(Fields& fields, reconstruct::Reduction& r) {
 
 void visit_reconstruction(Fields& fields, SessionConfig& session) {
   InverseOptions& r = session.reconstruction;
-  fields.one_of({"source", "how light enters"}, r.source, kSourceNames);
+  using reconstruct::diffusion::SourceModel;
+  LightEntry entry = r.choose_source                        ? LightEntry::kAuto
+                     : r.source == SourceModel::kCollimated ? LightEntry::kCollimated
+                                                            : LightEntry::kSurface;
+  fields.one_of({"source", "how light enters; auto: as the pictures ask for"}, entry, kSourceNames);
+  r.choose_source = entry == LightEntry::kAuto;
+  r.source = entry == LightEntry::kSurface ? SourceModel::kSurface : SourceModel::kCollimated;
   fields.one_of({"deposit", "where a cell's share of the collimated source is put"},
                 r.deposit,
                 kDepositNames);

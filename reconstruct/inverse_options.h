@@ -75,6 +75,8 @@ struct StartCoefficients {
 /// How a dataset is inverted.
 struct InverseOptions {
   diffusion::SourceModel source = diffusion::SourceModel::kCollimated;
+  bool choose_source =
+      false;  ///< `source` is what choose_source() finds; who reconstructs calls it first
   diffusion::Deposit deposit = diffusion::Deposit::kCentroid;
   diffusion::BoundaryModel boundary = diffusion::BoundaryModel::kTwoMoment;
   CameraLaw camera = CameraLaw::kRefractedRay;  ///< without Dataset::view_direction kSurface

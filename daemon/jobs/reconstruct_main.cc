@@ -15,6 +15,7 @@
 #include "daemon/scattering/start_material.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/material_uncertainty.h"
+#include "reconstruct/source_choice.h"
 #include "reconstruct/summary.h"
 #include "reconstruct/surface_reflectance.h"
 #include "reconstruct/target_error.h"
@@ -82,8 +83,18 @@ nlohmann::ordered_json to_json(const TargetReport& report) {
           {"rungs", std::move(rungs)}};
 }
 
+nlohmann::ordered_json to_json(const reconstruct::SourceChoice& choice) {
+  return {{"taken", to_string(choice.model)},
+          {"surface_chi_squared_per_datum", choice.surface},
+          {"collimated_chi_squared_per_datum", choice.collimated},
+          {"gain", choice.gain.per_datum},
+          {"gain_standard_error", choice.gain.standard_error},
+          {"why", choice.why}};
+}
+
 std::string summary(const config::SessionConfig& config,
                     const Dataset& dataset,
+                    const std::optional<reconstruct::SourceChoice>& source,
                     const TargetResult& found,
                     const Uncertainty& uncertainty) {
   auto json = nlohmann::ordered_json::parse(
@@ -91,6 +102,7 @@ std::string summary(const config::SessionConfig& config,
   json["quality"] = config::to_string(config.quality);
   json["grid_step"] = config.reduction.grid_step;
   json["use_regions"] = config.reduction.regions;
+  if (source) json["source_choice"] = to_json(*source);
   if (config.target_error > 0.0) json["target_error"] = to_json(found.report);
   if (uncertainty.found) {
     json["uncertainty"] = reconstruct::to_json(*uncertainty.found);
@@ -128,6 +140,19 @@ Result<void> write_surface_reflectance(JobContext& job,
   return *surface ? write_surface(job.files, job.session.surface(), **surface) : ok();
 }
 
+/// Where the session leaves the source to the pictures; from then on it is what they asked for.
+Result<std::optional<reconstruct::SourceChoice>> find_source(
+    config::SessionConfig& config,
+    const Dataset& dataset,
+    reconstruct::diffusion::FluenceSolver& solver,
+    std::stop_token stop) {
+  if (!config.reconstruction.choose_source) return std::optional<reconstruct::SourceChoice>();
+  auto choice = reconstruct::choose_source(dataset, config.reconstruction, solver, std::move(stop));
+  if (!choice) return choice.error();
+  config.reconstruction.source = choice->model;
+  return std::optional(*std::move(choice));
+}
+
 Result<void> reconstruct_session(JobContext& job) {
   auto config = config::load_resolved(job.session);
   if (!config) return config.error();
@@ -141,6 +166,8 @@ Result<void> reconstruct_session(JobContext& job) {
   if (!dataset) return dataset.error().in("dataset");
   const auto back_end = reconstruct::make_back_end(config->reconstruction);
   if (!back_end) return back_end.error();
+  const auto source = find_source(*config, *dataset, *back_end->solver, job.stop);
+  if (!source) return source.error();
   const SystemClock clock;
   auto found = find_material(*config,
                              *dataset,
@@ -165,8 +192,9 @@ Result<void> reconstruct_session(JobContext& job) {
   auto surface = write_surface_reflectance(
       job, *dataset, found->result.material, config->reconstruction, *back_end->solver);
   if (!surface) return surface;
-  return write_whole(
-      job.files, job.session.reconstruction(), summary(*config, *dataset, *found, *uncertainty));
+  return write_whole(job.files,
+                     job.session.reconstruction(),
+                     summary(*config, *dataset, *source, *found, *uncertainty));
 }
 
 }  // namespace

@@ -20,9 +20,11 @@ std::string boundary(reconstruct::diffusion::BoundaryModel model) {
 
 std::string source(const reconstruct::InverseOptions& options) {
   using reconstruct::diffusion::SourceModel;
-  return options.source == SourceModel::kCollimated
-             ? "collimated: first scattering along the perpendicular ray"
-             : "surface: diffuse light enters at the boundary";
+  const std::string chosen = options.choose_source ? ", as the pictures asked for" : "";
+  return (options.source == SourceModel::kCollimated
+              ? "collimated: first scattering along the perpendicular ray"
+              : "surface: diffuse light enters at the boundary") +
+         chosen;
 }
 
 std::string calibration(const ReportData& data) {

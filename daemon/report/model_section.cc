@@ -66,6 +66,13 @@ std::string two_numbers(const json& channels) {
          html::table({"channel", "σs', 1/mm", "σa, 1/mm"}, rows);
 }
 
+std::string source_answer(const json& reconstruction) {
+  const json choice = reconstruction.value("source_choice", json::object());
+  if (!choice.contains("taken")) return "";
+  return html::paragraph(fmt::format(
+      "Light enters: {} source; {}.", choice.value("taken", ""), choice.value("why", "")));
+}
+
 Rows ladder_rows(const json& channel) {
   Rows rows;
   for (const json& rung : array_at(channel, "ladder")) {
@@ -97,7 +104,7 @@ std::string model_section(const json& reconstruction) {
   if (rows.empty()) return "";
   const bool crossed = std::ranges::any_of(
       channels, [](const json& channel) { return channel.value("cross_validated", false); });
-  return answers(channels) + two_numbers(channels) +
+  return source_answer(reconstruction) + answers(channels) + two_numbers(channels) +
          html::paragraph(fmt::format(
              "Models from the simplest up, each judged by {}. χ² per datum: 1 is what the measured "
              "noise and the model's own error make, the noise floor what noise alone does. A finer "

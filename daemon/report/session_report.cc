@@ -19,6 +19,7 @@
 #include "base/io/volume_io.h"
 #include "daemon/jobs/version.h"
 #include "daemon/report/bssrdf.h"
+#include "daemon/report/found_source.h"
 #include "daemon/report/picture.h"
 #include "daemon/report/plot_sheet.h"
 #include "daemon/report/report_data.h"
@@ -62,6 +63,8 @@ Result<ReportData> read_session(const SessionDirectory& session) {
   if (!data.reconstruction.is_object()) {
     return invalid_argument(fmt::format("{} is not JSON", session.reconstruction().string()));
   }
+  if (const auto source = found_source(data.reconstruction))
+    data.config.reconstruction.source = *source;
   if (data.dataset.lit_face == data.dataset.seen_face) {
     const double margin = data.reconstruction.value("direct_light_margin_mm", 0.0);
     for (Illumination& i : data.dataset.illuminations) {

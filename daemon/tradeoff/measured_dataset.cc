@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/files.h"
 #include "base/io/dataset_io.h"
 #include "base/io/transport_io.h"
 #include "base/session_directory.h"
 #include "config/session_config.h"
 #include "daemon/report/bssrdf.h"
+#include "daemon/report/found_source.h"
 #include "reconstruct/back_end.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/translucency.h"
@@ -23,6 +26,10 @@ Result<void> add_session(const SessionDirectory& session, MeasuredDataset& data)
   const auto config = config::load_resolved(session);
   if (!config) return config.error();
   data.options = config->reconstruction;
+  if (const auto text = read_text(session.reconstruction())) {
+    const auto source = found_source(nlohmann::json::parse(*text, nullptr, false));
+    if (source) data.options.source = *source;
+  }
   const config::SimConfig& sim = config->rig.sim;
   if (!config->rig.is_simulated() || sim.responses.empty()) return ok();
   auto truth = read_transport(sim.responses);
