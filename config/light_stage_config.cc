@@ -113,12 +113,12 @@ namespace {
 constexpr std::array<std::string_view, 3> kMixtureNames{"none", "halves", "bands"};
 
 void visit_body(Fields& fields, sim::LedSphereOptions& sphere) {
-  fields.text({"body", "in place of the balls: ball | blob_a | blob_b | dent; of the only radius"},
+  fields.text({"body", "in place of the balls: ball | blob_a to blob_d | dent; of the only radius"},
               sphere.body);
   if (!sphere.body.empty()) {
     fields.check(std::ranges::find(sim::kBodyNames, sphere.body) != sim::kBodyNames.end(),
                  "body",
-                 "expected ball, blob_a, blob_b or dent, or nothing");
+                 "expected ball, blob_a, blob_b, blob_c, blob_d or dent, or nothing");
     fields.check(sphere.radii_mm.size() == 1, "radii", "expected one, of the body");
   }
   fields.one_of({"mixture", "of a second material in the body"}, sphere.mixture, kMixtureNames);

@@ -1,12 +1,15 @@
 #include "sim/blob.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "base/ensure.h"
+#include "sim/sensor.h"
 
 namespace opaline::sim {
 namespace {
@@ -171,7 +174,26 @@ Result<BlobShape> blob_of_name(std::string_view name, double radius_mm) {
                       lobe({-0.7, 0.4, 0.4}, 0.25, 0.6),
                       lobe({0.1, -0.1, 1.0}, -0.12, 0.35)}};
   if (name == "dent") return BlobShape{radius_mm, {lobe({0.15, 0.1, 1.0}, -0.3, 0.4)}};
-  return not_found(fmt::format("no body \"{}\"; there are ball, blob_a, blob_b, dent", name));
+  if (name == "blob_c") return blob_of_seed(3, radius_mm);
+  if (name == "blob_d") return blob_of_seed(4, radius_mm);
+  return not_found(fmt::format("no body \"{}\"; there are {}", name, fmt::join(kBodyNames, ", ")));
+}
+
+BlobShape blob_of_seed(std::uint64_t seed, double radius_mm) {
+  constexpr int kLobes = 6;
+  BlobShape shape{radius_mm, {}};
+  for (std::uint64_t n = 0; n < kLobes; ++n) {
+    const auto draw = [&](std::uint64_t k) {
+      return uniform(mix(mix(seed, 0x626c6f62), 8 * n + k));
+    };
+    const double z = draw(0);
+    const double turn = 2.0 * std::numbers::pi * draw(1);
+    const double across = std::sqrt(1.0 - z * z);
+    shape.lobes.push_back({normalized({across * std::cos(turn), across * std::sin(turn), z}),
+                           -0.08 + 0.28 * draw(2),
+                           0.5 + 0.5 * draw(3)});
+  }
+  return shape;
 }
 
 }  // namespace opaline::sim

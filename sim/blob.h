@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -57,9 +58,14 @@ class Blob {
   double step_;       // least, mm
 };
 
-inline constexpr std::array<std::string_view, 4> kBodyNames{"ball", "blob_a", "blob_b", "dent"};
-/// Bodies that come with the program: "ball"; "blob_a", convex to the front with three bumps; "blob_b", with a saddle and a dent in front; "dent",
-/// a ball with one deep dent. Errors: kNotFound for another name.
+inline constexpr std::array<std::string_view, 6> kBodyNames{
+    "ball", "blob_a", "blob_b", "blob_c", "blob_d", "dent"};
+/// Bodies that come with the program: "ball"; "blob_a", convex to the front with three bumps; "blob_b", with a saddle and a dent in front; "blob_c" and
+/// "blob_d", of lobes drawn at random (blob_of_seed with seeds 3 and 4), by which nothing was chosen; "dent", a ball with one deep dent.
+/// Errors: kNotFound for another name.
 Result<BlobShape> blob_of_name(std::string_view name, double radius_mm);
+
+/// Six lobes towards directions drawn evenly from the half that faces +z, 0.5 to 1 radian wide, -0.08 to 0.2 of the radius high.
+BlobShape blob_of_seed(std::uint64_t seed, double radius_mm);
 
 }  // namespace opaline::sim
