@@ -64,7 +64,7 @@ double formula_error(const StageCase& stage,
   reconstruct::for_each_window(
       values, half, team, [&](int x, int y, const reconstruct::WindowValues& w) {
         const double curvature = w.curvature / ideal.pixel_mm;
-        const auto albedo = model.reduced_albedo(std::clamp(w.reflectance, 0.0, 1.0));
+        const auto albedo = model.reduced_albedo(std::clamp<double>(w.reflectance, 0.0, 1.0));
         if (w.count < 6 || !(curvature > 0.0) || !albedo) return;
         const auto bend = model.bend(*albedo, w.ratio);
         const double found = formula == Formula::kDipole

@@ -38,7 +38,8 @@ constexpr std::array<std::array<std::uint8_t, 3>, kReasons> kReasonColors{{{255,
                                                                            {120, 190, 240},
                                                                            {240, 160, 60},
                                                                            {200, 60, 60},
-                                                                           {120, 200, 90}}};
+                                                                           {120, 200, 90},
+                                                                           {220, 200, 70}}};
 
 /// A map's values over what is shown of it.
 struct View {
@@ -369,8 +370,16 @@ void SphereReport::add_truth() {
 void SphereReport::add_reasons() {
   body_ += "<section id=\"left-out\">\n<h2>Left out, and why</h2>\n";
   add_picture("left_out", "Green: white has an answer, other colours as in the table.");
-  static constexpr std::array<const char*, kReasons> kNames{
-      "white", "dark grey", "magenta", "blue", "brown", "light blue", "orange", "red", "green"};
+  static constexpr std::array<const char*, kReasons> kNames{"white",
+                                                            "dark grey",
+                                                            "magenta",
+                                                            "blue",
+                                                            "brown",
+                                                            "light blue",
+                                                            "orange",
+                                                            "red",
+                                                            "green",
+                                                            "yellow"};
   std::vector<std::vector<std::string>> rows;
   for (int reason = 0; reason < kReasons; ++reason) {
     std::vector<std::string> row{fmt::format("{} ({})",

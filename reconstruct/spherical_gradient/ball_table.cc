@@ -24,8 +24,10 @@ static_assert(std::size(kLowRows) == std::size(kRows) && std::size(kHighRows) ==
 constexpr double kLow = 1.3;  // indices they were traced at
 constexpr double kMiddle = 1.4;
 constexpr double kHigh = 1.5;
-constexpr int kBendPowers = 4;    // x^1 ... x^4
-constexpr double kWhite = 0.003;  // relative: better than any white target
+constexpr int kBendPowers = 4;      // x^1 ... x^4
+constexpr double kWhite = 0.003;    // relative: better than any white target
+constexpr std::size_t kPowers = 5;  // of the spread's polynomial
+constexpr double kMostUneven = 100.0;
 constexpr int kIterations = 40;
 constexpr double kArrived = 1e-9;  // quadratic: the next step would be nothing
 
@@ -224,6 +226,29 @@ double BallTable::decay_of(double reflectance, double curvature) const {
     u = next;
   }
   return u;
+}
+
+double BallTable::curvature_where(const Found& found, double unevenness) const {
+  if (!(unevenness > 0.0)) return found.curvature;
+  const double g = decay(found.reduced_albedo);
+  const double linear = polynomial(bend_[0], g).first;
+  std::array<double, kPowers> spread{};  // of N(x) / x^2
+  for (std::size_t j = 1; j < bend_.size(); ++j) spread[j - 1] = polynomial(bend_[j], g).first;
+  const auto excess = [&](double x, double root) {
+    const auto [value, slope] = polynomial(spread, root * x);
+    const double z = root * x;
+    return std::pair{linear * x + z * z * value, linear + root * (2.0 * z * value + z * z * slope)};
+  };
+  const double wanted = excess(found.curvature, 1.0).first;
+  const double root = std::sqrt(1.0 + std::min(unevenness, kMostUneven));
+  double x = found.curvature / root;
+  for (int n = 0; n < 8; ++n) {
+    const auto [value, slope] = excess(x, root);
+    const double step = (wanted - value) / slope;
+    x = std::clamp(x + step, 1e-3 * found.curvature, found.curvature);
+    if (std::abs(step) < 1e-9) break;
+  }
+  return x;
 }
 
 double BallTable::flat_ratio(double reflectance) const {

@@ -65,6 +65,11 @@ class BallTable {
   Found find(double reflectance, double ratio) const;
   /// The same answer, sooner where `near` is what a neighbour found.
   Found find(double reflectance, double ratio, const Found& near) const;
+  /// k l_d of what was found on a ball, where the surface bends by k_1 and k_2 instead, k = H their mean: what is linear in k is light that goes on slanted,
+  /// and sees the surface bend by H; the rest is how far light spreads, by the mean of the squared normal curvatures,
+  ///
+  ///   f_1 x + N(x sqrt(1 + unevenness)) = f_1 x_ball + N(x_ball),    N the powers from 2 on, unevenness = ((k_1 - k_2)/2)^2 / H^2
+  double curvature_where(const Found& found, double unevenness) const;
   /// r of a flat surface of that reflectance: where find() begins.
   double flat_ratio(double reflectance) const;
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reconstruct/spherical_gradient/normal_softness.h"
+#include "reconstruct/spherical_gradient/pixel_ratio.h"
 #include "reconstruct/spherical_gradient/shape_reach.h"
-#include "reconstruct/spherical_gradient/window_fit.h"
+#include "reconstruct/spherical_gradient/window_choice.h"
 
 namespace opaline::reconstruct {
 namespace {
@@ -18,8 +20,8 @@ constexpr double kTableDeviation = 0.02;
 /// The tilt that a camera's slanted look makes, as a depth in mean free paths, and what of it is not known (tests/reconstruct/spherical_gradient/camera_tilt_test.cc).
 constexpr double kTiltDepth = 1.0;
 constexpr double kTiltDeviation = 0.2;
-/// Deviations below zero that make a curvature negative for sure: small windows are noisy, and there are many of them.
-constexpr double kSureConcave = 4.0;
+/// What of the correction for two different principal curvatures is not known.
+constexpr double kUnevenDeviation = 0.3;
 
 Result<void> check(const GradientPictures& p, const MapOptions& options) {
   if (p.width < 1 || p.height < 1)
@@ -76,144 +78,6 @@ ScatteringMaps empty_maps(int width, int height) {
   return maps;
 }
 
-/// r = C S^(-1/2) of one pixel, S = sum L_i^2 less what noise adds to it, L_i = 2 P_i - C; to second order without the bias that noise
-/// gives to it, 3/8 var(S)/S^2 and the covariance of C with S.
-struct PixelRatio {
-  std::array<double, 3> gradient{};
-  double square = 0.0;             ///< S; nothing below is set where it is not above 0
-  double gradient_variance = 0.0;  ///< sum of the components'
-  double ratio = 0.0;
-  double variance = 0.0;
-};
-
-PixelRatio ratio_of(const GradientPictures& p, std::size_t at) {
-  PixelRatio r;
-  const double constant = p.radiance[0][at];
-  const double constant_variance = p.variance[0][at];
-  for (std::size_t n = 0; n < 3; ++n) {
-    r.gradient[n] = 2.0 * p.radiance[n + 1][at] - constant;
-    r.square += r.gradient[n] * r.gradient[n];
-    r.gradient_variance += 4.0 * p.variance[n + 1][at] + constant_variance;
-  }
-  r.square -= r.gradient_variance;
-  if (!(r.square > 0.0)) return r;
-  const double root = std::sqrt(r.square);
-  const double tilt = (r.gradient[0] + r.gradient[1] + r.gradient[2]) / root;
-  const double by_constant = (1.0 + constant * tilt / root) / root;
-  r.variance = by_constant * by_constant * constant_variance;
-  double along = tilt * tilt * constant_variance;  // variance of L's length
-  for (std::size_t n = 0; n < 3; ++n) {
-    const double cosine = r.gradient[n] / root;
-    const double by_gradient = 2.0 * constant * cosine / r.square;
-    r.variance += by_gradient * by_gradient * p.variance[n + 1][at];
-    along += 4.0 * cosine * cosine * p.variance[n + 1][at];
-  }
-  const double bias = 1.5 * along / r.square + tilt * constant_variance / (constant * root);
-  r.ratio = constant / root * (1.0 - bias);
-  return r;
-}
-
-void measure_pixel(const GradientPictures& p,
-                   std::size_t at,
-                   PixelValues& values,
-                   ScatteringMaps& maps) {
-  if (p.measured[at] == kClipped) maps.left_out[at] = LeftOut::kSaturated;
-  if (p.measured[at] != kMeasured || !(p.radiance[0][at] > 0.0F)) return;
-  const PixelRatio r = ratio_of(p, at);
-  if (!(r.square > 0.0)) return;
-  const double length = std::hypot(r.gradient[0], r.gradient[1], r.gradient[2]);
-  maps.normal_x[at] = static_cast<float>(r.gradient[0] / length);
-  maps.normal_y[at] = static_cast<float>(r.gradient[1] / length);
-  maps.normal_z[at] = static_cast<float>(r.gradient[2] / length);
-  values.normal_x[at] = maps.normal_x[at];
-  values.normal_y[at] = maps.normal_y[at];
-  values.normal_variance[at] = static_cast<float>(r.gradient_variance / 3.0 / r.square);
-  values.ratio[at] = static_cast<float>(r.ratio);
-  values.ratio_variance[at] = static_cast<float>(r.variance);
-  values.reflectance[at] = static_cast<float>(p.radiance[0][at] / p.white);
-  values.reflectance_variance[at] = static_cast<float>(p.variance[0][at] / (p.white * p.white));
-  values.measured[at] = 1;
-}
-
-/// Ratios of flat surfaces, looked up by reflectance.
-class FlatRatios {
- public:
-  explicit FlatRatios(const BallTable& table) {
-    for (std::size_t n = 0; n < ratios_.size(); ++n)
-      ratios_[n] = table.flat_ratio(static_cast<double>(n) / kSteps);
-  }
-  double at(double reflectance) const {
-    const double place = std::clamp(reflectance, 0.0, 1.0) * kSteps;
-    const auto n = std::min(static_cast<std::size_t>(place), ratios_.size() - 2);
-    const double part = place - static_cast<double>(n);
-    return (1.0 - part) * ratios_[n] + part * ratios_[n + 1];
-  }
-
- private:
-  static constexpr int kSteps = 256;
-  std::array<double, kSteps + 1> ratios_{};
-};
-
-bool is_certain(const WindowValues& w, double flat, double certain) {
-  const double beyond = w.ratio - flat;
-  return w.count >= 6 && w.curvature > 0.0 && beyond > 0.0 &&
-         w.curvature_variance < certain * certain * w.curvature * w.curvature &&
-         w.ratio_variance < certain * certain * beyond * beyond;
-}
-
-/// A pixel's normal as its window says, a unit vector.
-void put_normal(const WindowValues& w, std::size_t at, ScatteringMaps& maps) {
-  const double across = w.normal_x * w.normal_x + w.normal_y * w.normal_y;
-  if (!(across < 1.0)) return;
-  maps.normal_x[at] = static_cast<float>(w.normal_x);
-  maps.normal_y[at] = static_cast<float>(w.normal_y);
-  maps.normal_z[at] = static_cast<float>(std::sqrt(1.0 - across));
-}
-
-bool is_surely_concave(const WindowValues& w) {
-  return w.count >= 6 && w.curvature < 0.0 &&
-         w.curvature * w.curvature > kSureConcave * kSureConcave * w.curvature_variance;
-}
-
-/// Whether a larger window sees what the smaller one saw: where it does not, the object changes within it.
-bool agrees(const WindowValues& larger, const WindowValues& smaller, double sigmas) {
-  if (smaller.count < 6) return true;
-  const double bend = larger.curvature - smaller.curvature;
-  const double ratio = larger.ratio - smaller.ratio;
-  const double square = sigmas * sigmas;
-  return bend * bend <= square * smaller.curvature_variance &&
-         ratio * ratio <= square * smaller.ratio_variance;
-}
-
-/// The smallest window of every pixel that is certain enough or certainly concave, or the largest one that agrees with the ones before; normals by the first that is certain of them.
-std::vector<WindowValues> choose_windows(const PixelValues& values,
-                                         const FlatRatios& flat,
-                                         const MapOptions& options,
-                                         ThreadTeam& team,
-                                         ScatteringMaps& maps) {
-  std::vector<WindowValues> chosen(values.measured.size());
-  std::vector<std::uint8_t> done(values.measured.size(), 0);
-  std::vector<std::uint8_t> has_normal(values.measured.size(), 0);
-  for (const int half : options.half_windows)
-    for_each_window(values, half, team, [&](int x, int y, const WindowValues& window) {
-      const std::size_t at = values.index(x, y);
-      if (has_normal[at] == 0 && window.count >= 6) {
-        put_normal(window, at, maps);
-        has_normal[at] =
-            window.normal_variance < options.normal_certain * options.normal_certain ? 1 : 0;
-      }
-      if (done[at] != 0) return;
-      if (!agrees(window, chosen[at], options.agree)) {
-        done[at] = 1;
-        return;
-      }
-      chosen[at] = window;
-      const double flat_ratio = flat.at(window.reflectance);
-      done[at] = is_certain(window, flat_ratio, options.certain) || is_surely_concave(window);
-    });
-  return chosen;
-}
-
 /// Variance of a ratio against the table's flat one.
 double ratio_variance(const WindowValues& w, const BallTable& table, const MapOptions& options) {
   const double of_table = table.ratio_deviation() * w.ratio;
@@ -233,11 +97,12 @@ struct IndexSpread {
   double log_decay = 0.0;
 };
 
-LeftOut judge(const WindowValues& w, double flat, double variance, double sigmas) {
+/// `sure` deviations make a curvature below zero concave, `sigmas` one above zero worth a look.
+LeftOut judge(const WindowValues& w, double flat, double variance, double sure, double sigmas) {
   if (w.count < 6) return LeftOut::kNotMeasured;
-  const double uncertain = sigmas * std::sqrt(w.curvature_variance);
-  if (w.curvature < -uncertain) return LeftOut::kConcave;
-  if (w.curvature <= uncertain) return LeftOut::kTooFlat;
+  const double deviation = std::sqrt(w.curvature_variance);
+  if (w.curvature < -sure * deviation) return LeftOut::kConcave;
+  if (w.curvature <= sigmas * deviation) return LeftOut::kTooFlat;
   if (w.ratio - flat <= sigmas * std::sqrt(variance)) return LeftOut::kBelowNoise;
   return LeftOut::kFound;
 }
@@ -283,14 +148,37 @@ void take_out_tilt(double shift, std::size_t at, ScatteringMaps& maps) {
   maps.normal_z[at] = static_cast<float>(std::sqrt(1.0 - turned * turned));
 }
 
+/// What the pixel before found: neighbours in a cell of a large window find the same, others find it near.
+class LastFound {
+ public:
+  void look_up(const BallTable& table, const WindowValues& w) {
+    if (w.reflectance == window_.reflectance && w.ratio == window_.ratio &&
+        w.unevenness == window_.unevenness && w.curvature == window_.curvature)
+      return;
+    window_ = w;
+    found_ = table.find(w.reflectance, w.ratio, found_);
+    if (found_.end == BallTable::End::kFound)
+      bent_ = table.curvature_where(found_, w.unevenness / (w.curvature * w.curvature));
+  }
+  const BallTable::Found& found() const { return found_; }
+  /// k l_d with both principal curvatures.
+  double bent() const { return bent_; }
+
+ private:
+  WindowValues window_;
+  BallTable::Found found_;
+  double bent_ = 0.0;
+};
+
 void estimate_pixel(const WindowValues& w,
                     double pixel_mm,
                     const BallTable& table,
                     const MapOptions& options,
                     std::size_t at,
-                    BallTable::Found& found,
+                    LastFound& last,
                     ScatteringMaps& maps) {
-  found = table.find(w.reflectance, w.ratio, found);
+  last.look_up(table, w);
+  const BallTable::Found& found = last.found();
   maps.left_out[at] = reason_of(found.end);
   if (found.end != BallTable::End::kFound) return;
   const IndexSpread index = index_spread(w, options);
@@ -299,12 +187,13 @@ void estimate_pixel(const WindowValues& w,
   const double ratio_noise = ratio_variance(w, table, options);
   const double reflectance_noise = reflectance_variance(w, options);
   const double g = std::sqrt(3.0 * (1.0 - found.reduced_albedo));
-  const double shift = kTiltDepth * g * found.curvature / options.ior;  // 3 D H / ior, times that
+  const double shift = kTiltDepth * g * last.bent() / options.ior;  // 3 D H / ior, times that
   const double by_tilt = curvature_by_tilt(shift, maps.normal_z[at]);
   const double curvature = w.curvature / pixel_mm / by_tilt;
   take_out_tilt(shift, at, maps);
   maps.curvature[at] = static_cast<float>(curvature);
-  const double translucency = found.curvature / curvature;
+  const double by_uneven = std::log(found.curvature / last.bent());
+  const double translucency = last.bent() / curvature;
   const double diffusion = g * translucency / 3.0;
   const auto& s = found.sensitivity;
   const double by_reflectance = s[0] + s[2];
@@ -313,6 +202,7 @@ void estimate_pixel(const WindowValues& w,
       by_reflectance * by_reflectance * reflectance_noise + by_ratio * by_ratio * ratio_noise +
       w.curvature_variance / (w.curvature * w.curvature) + kTableDeviation * kTableDeviation +
       kTiltDeviation * kTiltDeviation * (by_tilt - 1.0) * (by_tilt - 1.0) +
+      kUnevenDeviation * kUnevenDeviation * by_uneven * by_uneven +
       index.log_diffusion * index.log_diffusion;
   const double decay_variance = s[0] * s[0] * reflectance_noise + s[1] * s[1] * ratio_noise +
                                 index.log_decay * index.log_decay;
@@ -348,6 +238,8 @@ std::string_view to_string(LeftOut reason) {
       return "beyond the table";
     case LeftOut::kInterreflection:
       return "lit by a concave place";
+    case LeftOut::kUneven:
+      return "bent too unevenly";
   }
   return "unknown";
 }
@@ -366,9 +258,10 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
       measure_pixel(pictures, at, values, maps);
   });
   const FlatRatios flat(table);
+  const double sure = sure_deviations(values);
   const std::vector<WindowValues> windows = choose_windows(values, flat, options, team, maps);
   team.run([&](int thread) {
-    BallTable::Found last;
+    LastFound last;
     for (std::size_t at = share(thread); at < share(thread + 1); ++at) {
       const WindowValues& window = windows[at];
       if (values.measured[at] == 0 || window.count < 6) continue;
@@ -378,11 +271,13 @@ Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,
       maps.left_out[at] = judge(window,
                                 flat.at(window.reflectance),
                                 ratio_variance(window, table, options),
+                                sure,
                                 options.sigmas);
       if (maps.left_out[at] == LeftOut::kFound)
         estimate_pixel(window, pixel_mm, table, options, at, last, maps);
     }
   });
+  sharpen_normals(pictures, options.ior, team, maps);
   account_for_shape(pictures, team, maps);
   return maps;
 }

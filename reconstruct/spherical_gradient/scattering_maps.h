@@ -43,8 +43,9 @@ enum class LeftOut : std::uint8_t {
   kTooTranslucent,   ///< for its curvature
   kBeyondTable,      ///< brighter or darker than what was traced
   kInterreflection,  ///< a certainly concave place within 2 l_d lights it (shape_reach.h)
+  kUneven,  ///< bends so unevenly about it that ln D would be uncertain by more than a half
 };
-inline constexpr int kLastReason = static_cast<int>(LeftOut::kInterreflection);
+inline constexpr int kLastReason = static_cast<int>(LeftOut::kUneven);
 std::string_view to_string(LeftOut reason);  ///< "found", "not measured", "too flat", ...
 
 struct MapOptions {
@@ -94,7 +95,8 @@ struct ScatteringMaps {
 ///   delta = c sin(theta),   c = H / (sigma_t' ior) = 3 D H / ior     (within 20 % of Monte Carlo: tests/.../camera_tilt_test.cc)
 ///
 /// which makes curvature too large by 1 + c (cos theta - sin^2 theta / (2 cos theta)) on a ball. Both are taken out where D is found; a fifth of the latter
-/// is in the deviation.
+/// is in the deviation. Where the principal curvatures differ, the table's answer is moved by BallTable::curvature_where, three tenths of which are in the deviation;
+/// the normals found are sharpened (normal_softness.h).
 ///
 /// Errors: kInvalidArgument where sizes or numbers do not fit.
 Result<ScatteringMaps> estimate_scattering(const GradientPictures& pictures,

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "reconstruct/diffusion/fresnel.h"
+#include "reconstruct/spherical_gradient/exit_law.h"
 #include "reconstruct/spherical_gradient/window_fit.h"
 
 namespace opaline::reconstruct {
@@ -88,28 +89,6 @@ class Shapes {
   std::array<std::array<float, kCosines + 1>, kShapes> tables_{};
   std::array<double, kShapes> whole_{};
   std::array<double, kShapes> slanted_{};
-};
-
-/// Radiance over exitance / pi of light that arrives evenly below the surface.
-class ExitLaw {
- public:
-  explicit ExitLaw(double ior) : ior_(ior) {
-    constexpr int kSteps = 2000;
-    double kept = 0.0;
-    for (int i = 0; i < kSteps; ++i) {
-      const double mu = (i + 0.5) / kSteps;
-      kept += 2.0 * mu * (1.0 - diffusion::fresnel_reflectance(mu, ior)) / kSteps;
-    }
-    mean_ = kept;
-  }
-  double at(double cosine) const {
-    const double mu = std::clamp(cosine, 0.05, 1.0);
-    return (1.0 - diffusion::fresnel_reflectance(mu, ior_)) / mean_;
-  }
-
- private:
-  double ior_;
-  double mean_ = 1.0;
 };
 
 struct Lamp {

@@ -33,21 +33,30 @@ struct PixelValues {
 /// so a ball's curvature is found without bias in windows of any size.
 struct WindowValues {
   int count = 0;           ///< measured pixels; nothing else is set below six of them
-  double curvature = 0.0;  ///< H, 1/pixel
-  double curvature_variance = 0.0;
-  double normal_x = 0.0;  ///< of those planes at the pixel itself
-  double normal_y = 0.0;
-  double normal_variance = 0.0;  ///< of one component
-  double ratio = 0.0;
-  double ratio_variance = 0.0;
-  double reflectance = 0.0;
-  double reflectance_variance = 0.0;
+  float curvature = 0.0F;  ///< H, 1/pixel
+  float curvature_variance = 0.0F;
+  /// ((k_1 - k_2)/2)^2 = H^2 - K of the principal curvatures, 1/pixel^2, less what noise adds to it; below 0 by noise. K is the determinant of the planes' slopes.
+  float unevenness = 0.0F;
+  float normal_x = 0.0F;  ///< of those planes at the pixel itself
+  float normal_y = 0.0F;
+  float normal_variance = 0.0F;  ///< of one component
+  float ratio = 0.0F;
+  float ratio_variance = 0.0F;
+  float reflectance = 0.0F;
+  float reflectance_variance = 0.0F;
 };
 
-/// Calls f(x, y, window) for the measured pixels of all rows, from several threads; `half` pixels on either side, clipped at the picture's edge. Sums
-/// slide, so the time does not depend on the window.
+/// Calls f(x, y, window) for the measured pixels, from several threads; `half` pixels on either side, clipped at the picture's edge. Sums slide, so the time
+/// does not depend on the window. From half = 8 on, pixels go by cells of half/4 (a power of two): those of a cell share their window, of whole cells, and differ
+/// in their place on its planes.
 void for_each_window(const PixelValues& pixels,
                      int half,
+                     ThreadTeam& team,
+                     const std::function<void(int x, int y, const WindowValues& window)>& f);
+/// The same for the pixels that are wanted, by their index; the others cost less.
+void for_each_window(const PixelValues& pixels,
+                     int half,
+                     const std::function<bool(std::size_t at)>& wanted,
                      ThreadTeam& team,
                      const std::function<void(int x, int y, const WindowValues& window)>& f);
 

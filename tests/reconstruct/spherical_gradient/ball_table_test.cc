@@ -72,6 +72,33 @@ TEST(BallTable, RecognisesBallsThatAreNotInIt) {
   }
 }
 
+TEST(BallTable, TwoPrincipalCurvaturesBendAsTheirMeanAndSpreadAsTheirSquares) {
+  const BallTable& table = BallTable::standard();
+  constexpr double kAlbedo = 0.96;
+  const double flat = std::log(table.light(kAlbedo, 0.0).ratio);
+  const double linear = (std::log(table.light(kAlbedo, 1e-6).ratio) - flat) / 1e-6;
+  const auto spread = [&](double x) {
+    return std::log(table.light(kAlbedo, x).ratio) - flat - linear * x;
+  };
+  for (const double ball : {0.05, 0.15, 0.3})
+    for (const double unevenness : {0.1, 1.0, 5.0}) {
+      const auto light = table.light(kAlbedo, ball);
+      const BallTable::Found found = table.find(light.reflectance, light.ratio);
+      const double bent = table.curvature_where(found, unevenness);
+      EXPECT_LT(bent, ball);
+      EXPECT_NEAR(linear * bent + spread(bent * std::sqrt(1.0 + unevenness)),
+                  linear * ball + spread(ball),
+                  1e-6);
+    }
+}
+
+TEST(BallTable, EvenlyBentSurfacesAreBalls) {
+  const auto light = BallTable::standard().light(0.96, 0.2);
+  const BallTable::Found found = BallTable::standard().find(light.reflectance, light.ratio);
+  EXPECT_EQ(BallTable::standard().curvature_where(found, 0.0), found.curvature);
+  EXPECT_EQ(BallTable::standard().curvature_where(found, -0.1), found.curvature);  // by noise
+}
+
 TEST(BallTable, TellsFlatSoftAndBrightSurfacesApart) {
   const BallTable& table = BallTable::standard();
   EXPECT_EQ(table.find(0.5, 1.40).end, BallTable::End::kFlat);

@@ -127,6 +127,16 @@ TEST(ScatteringMaps, ADentIsNamed) {
   EXPECT_EQ(maps.left_out[middle_of(maps)], LeftOut::kConcave);
 }
 
+TEST(ScatteringMaps, NoiseMakesNoPlaceOfALargePictureConcave) {
+  Scene scene;
+  scene.noise = 0.01;
+  scene.pixel_mm = 0.02;  // 0.5 megapixels of the ball
+  const auto [reflectance, ratio] = BallTable::standard().light(scene.reduced_albedo, 0.15);
+  const ScatteringMaps maps = estimate(pictures(scene, {reflectance, 0.0, ratio, 0.0}));
+  EXPECT_EQ(std::ranges::count(maps.left_out, LeftOut::kConcave), 0);
+  EXPECT_EQ(std::ranges::count(maps.left_out, LeftOut::kInterreflection), 0);
+}
+
 TEST(ScatteringMaps, AnOpaqueBallIsBelowTheNoise) {
   Scene scene;
   scene.noise = 0.01;

@@ -51,6 +51,28 @@ TEST(WindowFit, FindsABallsCurvatureInWindowsOfAnySizeAtAnyPlace) {
   }
 }
 
+TEST(WindowFit, TellsACylinderFromABall) {
+  PixelValues p = ball(0.0);
+  for (float& n : p.normal_y) n = 0.0F;
+  const WindowValues w = windows(p, 6)[p.index(kMiddle, kMiddle)];
+  EXPECT_NEAR(w.curvature, 0.5 / kRadius, 1e-7);
+  EXPECT_NEAR(w.unevenness, 0.25 / (kRadius * kRadius), 1e-9);
+  EXPECT_NEAR(windows(ball(0.0), 6)[p.index(kMiddle, kMiddle)].unevenness, 0.0, 1e-9);
+}
+
+TEST(WindowFit, NoiseMakesUnevennessNeitherLargerNorSmallerOnAverage) {
+  constexpr int kDraws = 200;
+  const std::size_t middle = PixelValues(kSize, kSize).index(kMiddle, kMiddle);
+  double sum = 0.0;
+  double squares = 0.0;
+  for (unsigned seed = 0; seed < kDraws; ++seed) {
+    const double u = windows(ball(0.05, seed), 5)[middle].unevenness;
+    sum += u / kDraws;
+    squares += u * u / kDraws;
+  }
+  EXPECT_LT(std::abs(sum), 4.0 * std::sqrt(squares / kDraws));
+}
+
 TEST(WindowFit, StatesTheCurvaturesUncertainty) {
   constexpr int kDraws = 200;
   const std::size_t middle = PixelValues(kSize, kSize).index(kMiddle, kMiddle);
