@@ -21,23 +21,34 @@ void print_blob(const std::string& which, const StageErrors& e) {
   print_figure("led.stated_deviation", name, e.stated, "1");
   print_figure("led.share_found", name, e.found, "1");
   print_figure("led.normal_error_deg", name, e.normal_deg, "degrees");
+  print_figure("led.normal_error_deg",
+               fmt::format("{}, answered", which).c_str(),
+               e.answered_normal_deg,
+               "degrees");
   for (std::size_t reason = 1; reason < e.reasons.size(); ++reason)
-    print_figure(
-        "led.share_left_out",
-        fmt::format(
-            "{}, {}", which, reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason)))
-            .c_str(),
-        e.reasons[reason],
-        "1");
+    if (e.reasons[reason] > 0.0)
+      print_figure(
+          "led.share_left_out",
+          fmt::format(
+              "{}, {}", which, reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason)))
+              .c_str(),
+          e.reasons[reason],
+          "1");
 }
 
 }  // namespace
 
-void measure_blobs(ThreadTeam& team, std::int64_t paths_per_pixel) {
-  for (const auto& [body, radius] :
-       {std::pair{"ball", 10.0}, {"blob_a", 10.0}, {"blob_b", 10.0}, {"dent", 8.0}}) {
+void measure_blobs(ThreadTeam& team, std::int64_t paths_per_pixel, const std::string& only) {
+  for (const auto& [body, radius] : {std::pair{"ball", 10.0},
+                                     {"blob_a", 10.0},
+                                     {"blob_b", 10.0},
+                                     {"blob_c", 10.0},
+                                     {"blob_d", 8.0},
+                                     {"dent", 8.0}}) {
+    if (!only.empty() && only != body) continue;
     StageScene scene;
     scene.body = body;
+    scene.seed = 7;
     scene.radii_mm = {radius};
     scene.paths_per_pixel = paths_per_pixel;
     const StageCase stage(scene);

@@ -189,9 +189,10 @@ StageErrors StageCase::errors(const StagePictures& pictures,
       const Vec3 n = seen->normal;
       const double cosine =
           n.x * maps.normal_x[at] - n.y * maps.normal_y[at] + n.z * maps.normal_z[at];
-      if (pictures.measured[at] == reconstruct::kMeasured)
-        e.normal_deg += std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+      const double degrees = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+      if (pictures.measured[at] == reconstruct::kMeasured) e.normal_deg += degrees;
       if (maps.left_out[at] != LeftOut::kFound) continue;
+      e.answered_normal_deg += degrees;
       const double off = std::log(maps.diffusion[at] / seen->diffusion_mm[1]);
       const double scattering = seen->reduced_albedo[1] / (3.0 * seen->diffusion_mm[1]);
       relative.push_back(std::abs(std::expm1(off)));
@@ -206,6 +207,7 @@ StageErrors StageCase::errors(const StagePictures& pictures,
   e.error = std::sqrt(e.error / found);
   e.albedo_error /= found;
   e.coverage /= found;
+  e.answered_normal_deg /= found;
   e.wrong /= pixels;
   e.found = static_cast<double>(offs.size()) / pixels;
   e.normal_deg /= std::max(1.0, pixels - e.reasons[static_cast<std::size_t>(LeftOut::kSaturated)]);

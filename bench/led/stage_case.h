@@ -50,18 +50,19 @@ struct StageShot {
 
 /// Over the pixels of one channel.
 struct StageErrors {
-  double bias = 0.0;          ///< median of ln D over the truth
-  double error = 0.0;         ///< root mean square of the same
-  double stated = 0.0;        ///< median of the stated deviation
-  double coverage = 0.0;      ///< share of the answers within two stated deviations
-  double found = 0.0;         ///< share of the pixels that have an answer
-  double wrong = 0.0;         ///< share of the pixels that have one beyond two stated deviations
-  double normal_deg = 0.0;    ///< mean
-  double albedo_error = 0.0;  ///< mean of |alpha' - truth| over the truth
-  double error_90 = 0.0;      ///< |D over the truth - 1| that nine tenths of the answers keep to
-  double scattering_error_90 = 0.0;  ///< the same of sigma_s'
-  double seconds = 0.0;              ///< of computing
-  std::array<double, 9> reasons{};   ///< share of the pixels by LeftOut
+  double bias = 0.0;        ///< median of ln D over the truth
+  double error = 0.0;       ///< root mean square of the same
+  double stated = 0.0;      ///< median of the stated deviation
+  double coverage = 0.0;    ///< share of the answers within two stated deviations
+  double found = 0.0;       ///< share of the pixels that have an answer
+  double wrong = 0.0;       ///< share of the pixels that have one beyond two stated deviations
+  double normal_deg = 0.0;  ///< mean, over what was measured
+  double answered_normal_deg = 0.0;  ///< mean, over the pixels that have an answer
+  double albedo_error = 0.0;         ///< mean of |alpha' - truth| over the truth
+  double error_90 = 0.0;  ///< |D over the truth - 1| that nine tenths of the answers keep to
+  double scattering_error_90 = 0.0;                            ///< the same of sigma_s'
+  double seconds = 0.0;                                        ///< of computing
+  std::array<double, reconstruct::kLastReason + 1> reasons{};  ///< share of the pixels by LeftOut
 };
 
 /// The lamp nearest to a direction.

@@ -1,0 +1,102 @@
+#include "bench/led/stage_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "bench/figure.h"
+#include "bench/led/stage_case.h"
+
+namespace opaline::bench {
+namespace {
+
+/// Shares of the pixels that have an answer, and that have a wrong one: beyond two stated deviations.
+void print_extreme(const char* which, const StageErrors& e) {
+  print_figure("led.extreme_found", which, e.found, "1");
+  print_figure("led.extreme_wrong", which, e.wrong, "1");
+  print_figure(
+      "led.extreme_bias_over_stated", which, e.stated > 0.0 ? e.bias / e.stated : 0.0, "1");
+}
+
+}  // namespace
+
+void measure_stage(ThreadTeam& team, std::int64_t paths) {
+  StageScene scene;
+  scene.paths = paths;
+  const StageCase stage(scene);
+  StageErrors mean;
+  constexpr int kRounds = 4;
+  for (int round = 1; round <= kRounds; ++round) {
+    StageShot shot;
+    shot.noise_seed = static_cast<std::uint64_t>(round);
+    const StageErrors e = stage.run(shot, team);
+    mean.bias += e.bias / kRounds;
+    mean.error += e.error / kRounds;
+    mean.coverage += e.coverage / kRounds;
+    mean.found += e.found / kRounds;
+    mean.normal_deg += e.normal_deg / kRounds;
+    mean.albedo_error += e.albedo_error / kRounds;
+  }
+  const char* const which = "stage, 4 frames";
+  print_figure("led.normal_error_deg", which, mean.normal_deg, "degrees");
+  print_figure("led.coverage_2sigma", which, mean.coverage, "1");
+  print_figure("led.share_found", which, mean.found, "1");
+  print_figure("led.stage_diffusion_bias", which, mean.bias, "1");
+  print_figure("led.stage_diffusion_error", which, mean.error, "1");
+  print_figure("led.stage_albedo_error", which, mean.albedo_error, "1");
+  StageShot halves;
+  halves.split = true;
+  const StageErrors shifted = stage.run({}, team);
+  const StageErrors split = stage.run(halves, team);
+  print_figure("led.shifted_less_split", "ln D, median", shifted.bias - split.bias, "1");
+  print_figure("led.shifted_less_split", "one stated deviation", shifted.stated, "1");
+}
+
+void measure_extremes(ThreadTeam& team, std::int64_t paths) {
+  StageScene ordinary;
+  ordinary.radii_mm = {8.0};
+  ordinary.paths = paths;
+  const StageCase stage(ordinary);
+  print_extreme("ordinary", stage.run({}, team));
+  StageShot shot;
+  shot.clip = 0.8;
+  print_extreme("one saturated picture", stage.run(shot, team));
+  for (const auto& [which, albedo] : {std::pair{"reduced albedo 0.5", 0.5},
+                                      {"reduced albedo 0.8", 0.8},
+                                      {"reduced albedo 0.999", 0.999},
+                                      {"reduced albedo 0.9999", 0.9999}}) {
+    StageScene scene = ordinary;
+    scene.reduced_albedo = albedo;
+    if (albedo > 0.99) scene.paths = std::min<std::int64_t>(paths, 50'000);
+    print_extreme(which, StageCase(scene).run({}, team));
+  }
+  for (const auto& [which, ior] :
+       {std::pair{"index 1.3 for 1.4 +- 0.1", 1.3}, {"index 1.5 for 1.4 +- 0.1", 1.5}}) {
+    StageScene scene = ordinary;
+    scene.ior = ior;
+    shot = {};
+    shot.ior_deviation = 0.1;
+    print_extreme(which, StageCase(scene).run(shot, team));
+  }
+  StageScene dead = ordinary;
+  dead.paths = std::min<std::int64_t>(paths, 100'000);
+  for (const auto& [which, way] : {std::pair{"dead lamp above", Vec3{0, 1, 0}},
+                                   {"dead lamp in front", Vec3{0, 0, 1}},
+                                   {"dead lamp aside, in front", Vec3{0.7, 0, 0.7}},
+                                   {"dead lamp behind", Vec3{0, 0, -1}}}) {
+    dead.dead_lamps = {lamp_towards(dead.lamps, way)};
+    dead.dead_are_known = false;
+    print_extreme(fmt::format("{}, unknown", which).c_str(), StageCase(dead).run({}, team));
+    dead.dead_are_known = true;
+    print_extreme(fmt::format("{}, found by the lamp check", which).c_str(),
+                  StageCase(dead).run({}, team));
+  }
+  StageScene uneven = ordinary;
+  uneven.intensity_error = 0.03;
+  shot = {};
+  shot.lamp_deviation = 0.03;
+  print_extreme("lamps off by 3 %, as is believed", StageCase(uneven).run(shot, team));
+}
+
+}  // namespace opaline::bench
