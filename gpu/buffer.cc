@@ -10,12 +10,13 @@ namespace opaline::gpu {
 namespace {
 
 using Property = vk::MemoryPropertyFlagBits;
+using Usage = vk::BufferUsageFlagBits;
 
 vk::BufferCreateInfo describe(std::uint64_t bytes) {
   return {{},
           bytes,
-          vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eTransferSrc |
-              vk::BufferUsageFlagBits::eTransferDst,
+          Usage::eStorageBuffer | Usage::eUniformBuffer | Usage::eIndexBuffer |
+              Usage::eTransferSrc | Usage::eTransferDst,
           vk::SharingMode::eExclusive};
 }
 

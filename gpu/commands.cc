@@ -27,7 +27,7 @@ void bind(const vk::raii::CommandBuffer& commands,
     const auto binding = static_cast<std::uint32_t>(infos.size());
     infos.emplace_back(*buffer->handles().buffer, 0, VK_WHOLE_SIZE);
     writes.emplace_back(
-        nullptr, binding, 0, 1, vk::DescriptorType::eStorageBuffer, nullptr, &infos.back());
+        nullptr, binding, 0, 1, buffer_type(h.interface, binding), nullptr, &infos.back());
   }
   if (!writes.empty()) commands.pushDescriptorSetKHR(point, *h.layout, 0, writes);
   if (!arguments.push.empty())
@@ -52,23 +52,37 @@ vk::ImageMemoryBarrier2 transition(const vk::raii::Image& image,
   return barrier;
 }
 
-vk::RenderingAttachmentInfo cleared(const vk::raii::ImageView& view, vk::AttachmentStoreOp store) {
+vk::RenderingAttachmentInfo attached(const vk::raii::ImageView& view, bool clear) {
   vk::RenderingAttachmentInfo info(*view, Layout::eAttachmentOptimal);
-  return info.setLoadOp(vk::AttachmentLoadOp::eClear).setStoreOp(store);
+  return info.setLoadOp(clear ? vk::AttachmentLoadOp::eClear : vk::AttachmentLoadOp::eLoad)
+      .setStoreOp(vk::AttachmentStoreOp::eStore);
 }
 
-/// Both planes start undefined: whatever they held is cleared.
+/// Planes that are cleared start undefined, whatever they held.
 void make_attachments(const vk::raii::CommandBuffer& commands,
-                      const RenderTarget::Handles& target) {
-  const std::array barriers{transition(target.color,
-                                       vk::ImageAspectFlagBits::eColor,
-                                       Layout::eUndefined,
-                                       Layout::eAttachmentOptimal),
-                            transition(target.depth,
-                                       vk::ImageAspectFlagBits::eDepth,
-                                       Layout::eUndefined,
-                                       Layout::eAttachmentOptimal)};
+                      const RenderTarget::Handles& target,
+                      bool clear) {
+  const Layout before = clear ? Layout::eUndefined : Layout::eAttachmentOptimal;
+  std::vector barriers{transition(
+      target.depth, vk::ImageAspectFlagBits::eDepth, before, Layout::eAttachmentOptimal)};
+  if (*target.color) {
+    barriers.push_back(transition(
+        target.color, vk::ImageAspectFlagBits::eColor, before, Layout::eAttachmentOptimal));
+  }
   commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, barriers));
+}
+
+void copy_plane(const vk::raii::CommandBuffer& commands,
+                const vk::raii::Image& image,
+                vk::ImageAspectFlagBits aspect,
+                const RenderTarget::Handles& target,
+                const Buffer& to) {
+  const auto source =
+      transition(image, aspect, Layout::eAttachmentOptimal, Layout::eTransferSrcOptimal);
+  commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, source));
+  const vk::BufferImageCopy region(
+      0, 0, 0, {aspect, 0, 0, 1}, {0, 0, 0}, {target.width, target.height, 1});
+  commands.copyImageToBuffer(*image, Layout::eTransferSrcOptimal, *to.handles().buffer, region);
 }
 
 }  // namespace
@@ -109,37 +123,58 @@ void Commands::dispatch(const Pipeline& kernel,
   handles_->commands.dispatch(groups[0], groups[1], groups[2]);
 }
 
-void Commands::draw(const Pipeline& raster,
-                    const Arguments& arguments,
-                    std::uint32_t vertices,
-                    RenderTarget& target) {
+void Commands::begin_drawing(const Pipeline& raster,
+                             const Arguments& arguments,
+                             RenderTarget& target,
+                             bool clear) {
   const vk::raii::CommandBuffer& commands = handles_->commands;
   const RenderTarget::Handles& t = target.handles();
-  make_attachments(commands, t);
+  make_attachments(commands, t, clear);
   const vk::Rect2D area({0, 0}, {t.width, t.height});
-  const auto color = cleared(t.color_view, vk::AttachmentStoreOp::eStore);
-  const auto depth = cleared(t.depth_view, vk::AttachmentStoreOp::eDontCare);
-  commands.beginRendering(vk::RenderingInfo({}, area, 1, 0, color, &depth));
+  const auto color = attached(t.color_view, clear);
+  const auto depth = attached(t.depth_view, clear);
+  vk::RenderingInfo info;
+  info.setRenderArea(area).setLayerCount(1).setPDepthAttachment(&depth);
+  if (*t.color) info.setColorAttachments(color);
+  commands.beginRendering(info);
   bind(commands, raster, vk::PipelineBindPoint::eGraphics, arguments);
   commands.setViewport(
       0, vk::Viewport(0, 0, static_cast<float>(t.width), static_cast<float>(t.height), 0, 1));
   commands.setScissor(0, area);
-  commands.draw(vertices, 1, 0, 0);
-  commands.endRendering();
+}
+
+void Commands::draw(const Pipeline& raster,
+                    const Arguments& arguments,
+                    std::uint32_t vertices,
+                    RenderTarget& target) {
+  begin_drawing(raster, arguments, target, /*clear=*/true);
+  handles_->commands.draw(vertices, 1, 0, 0);
+  handles_->commands.endRendering();
+}
+
+void Commands::draw(const Pipeline& raster,
+                    const Arguments& arguments,
+                    const Indexed& triangles,
+                    RenderTarget& target,
+                    bool clear) {
+  ENSURE(4 * (std::uint64_t{triangles.first} + triangles.count) <= triangles.indices.bytes());
+  begin_drawing(raster, arguments, target, clear);
+  handles_->commands.bindIndexBuffer(
+      *triangles.indices.handles().buffer, 0, vk::IndexType::eUint32);
+  handles_->commands.drawIndexed(triangles.count, 1, triangles.first, 0, 0);
+  handles_->commands.endRendering();
 }
 
 void Commands::copy_color(const RenderTarget& from, Buffer& to) {
   ENSURE(to.bytes() >= from.color_bytes());
   const RenderTarget::Handles& t = from.handles();
-  const auto source = transition(t.color,
-                                 vk::ImageAspectFlagBits::eColor,
-                                 Layout::eAttachmentOptimal,
-                                 Layout::eTransferSrcOptimal);
-  handles_->commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, source));
-  const vk::BufferImageCopy region(
-      0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, 0, 0}, {t.width, t.height, 1});
-  handles_->commands.copyImageToBuffer(
-      *t.color, Layout::eTransferSrcOptimal, *to.handles().buffer, region);
+  copy_plane(handles_->commands, t.color, vk::ImageAspectFlagBits::eColor, t, to);
+}
+
+void Commands::copy_depth(const RenderTarget& from, Buffer& to) {
+  ENSURE(to.bytes() >= from.depth_bytes());
+  const RenderTarget::Handles& t = from.handles();
+  copy_plane(handles_->commands, t.depth, vk::ImageAspectFlagBits::eDepth, t, to);
 }
 
 void Commands::copy(const Buffer& from, Buffer& to, std::uint64_t bytes) {

@@ -51,8 +51,22 @@ class Commands {
             const Arguments& arguments,
             std::uint32_t vertices,
             RenderTarget& target);
+  /// The same of triangles whose corners are numbered in `indices`, 32 bits each; what was drawn before stays where
+  /// `clear` is false.
+  struct Indexed {
+    const Buffer& indices;
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+  };
+  void draw(const Pipeline& raster,
+            const Arguments& arguments,
+            const Indexed& triangles,
+            RenderTarget& target,
+            bool clear);
   /// The target's colour as rows of RGBA floats, top row first. Waits for the draw.
   void copy_color(const RenderTarget& from, Buffer& to);
+  /// The depth of a target without colour as rows of floats.
+  void copy_depth(const RenderTarget& from, Buffer& to);
   void copy(const Buffer& from, Buffer& to, std::uint64_t bytes);
   void fill_zero(Buffer& buffer);
   /// Whatever was recorded before is done, and seen by whatever comes after and by the host when
@@ -63,6 +77,10 @@ class Commands {
   const Handles& handles() const { return *handles_; }
 
  private:
+  void begin_drawing(const Pipeline& raster,
+                     const Arguments& arguments,
+                     RenderTarget& target,
+                     bool clear);
   explicit Commands(std::unique_ptr<Handles> handles);
   std::unique_ptr<Handles> handles_;
 };

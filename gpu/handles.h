@@ -16,7 +16,7 @@
 #include "gpu/pipeline.h"
 
 /// Vulkan's handles behind the classes of gpu/, each in Vulkan-Hpp's RAII types: for the .cc files
-/// of gpu/ only, since <vulkan/vulkan_raii.hpp> costs seconds to compile.
+/// of gpu/ and of the viewer's window only, since <vulkan/vulkan_raii.hpp> costs seconds to compile.
 namespace opaline::gpu {
 
 /// Calls a function of Vulkan-Hpp, which throws, and turns what it throws into an Error.
@@ -101,6 +101,11 @@ struct RenderTarget::Handles {
 
 inline constexpr vk::Format kColorFormat = vk::Format::eR32G32B32A32Sfloat;
 inline constexpr vk::Format kDepthFormat = vk::Format::eD32Sfloat;
+
+inline vk::DescriptorType buffer_type(const Interface& interface, std::uint32_t binding) {
+  return binding < interface.uniforms ? vk::DescriptorType::eUniformBuffer
+                                      : vk::DescriptorType::eStorageBuffer;
+}
 
 struct Pipeline::Handles {
   Context::Handles* context = nullptr;

@@ -55,20 +55,37 @@ std::uint32_t RenderTarget::height() const { return handles_->height; }
 Result<RenderTarget> RenderTarget::create(Context& context,
                                           std::uint32_t width,
                                           std::uint32_t height) {
+  return made(context, width, height, /*with_color=*/true);
+}
+
+Result<RenderTarget> RenderTarget::create_depth(Context& context,
+                                                std::uint32_t width,
+                                                std::uint32_t height) {
+  return made(context, width, height, /*with_color=*/false);
+}
+
+Result<RenderTarget> RenderTarget::made(Context& context,
+                                        std::uint32_t width,
+                                        std::uint32_t height,
+                                        bool with_color) {
   const std::uint32_t most = context.device().max_image_side;
   if (width == 0 || height == 0 || width > most || height > most)
     return invalid_argument(fmt::format(
         "a render target of {} x {} pixels; 1 to {} a side are possible", width, height, most));
   using Usage = vk::ImageUsageFlagBits;
   const vk::Extent3D size(width, height, 1);
-  auto color =
-      create_plane(context.handles(),
-                   describe(kColorFormat, size, Usage::eColorAttachment | Usage::eTransferSrc),
-                   vk::ImageAspectFlagBits::eColor);
+  Result<Plane> color = Plane();
+  if (with_color) {
+    color =
+        create_plane(context.handles(),
+                     describe(kColorFormat, size, Usage::eColorAttachment | Usage::eTransferSrc),
+                     vk::ImageAspectFlagBits::eColor);
+  }
   if (!color) return color.error();
-  auto depth = create_plane(context.handles(),
-                            describe(kDepthFormat, size, Usage::eDepthStencilAttachment),
-                            vk::ImageAspectFlagBits::eDepth);
+  auto depth = create_plane(
+      context.handles(),
+      describe(kDepthFormat, size, Usage::eDepthStencilAttachment | Usage::eTransferSrc),
+      vk::ImageAspectFlagBits::eDepth);
   if (!depth) return depth.error();
   auto h = std::make_unique<Handles>();
   h->context = &context.handles();

@@ -17,7 +17,7 @@ using Stage = vk::ShaderStageFlagBits;
 void create_layout(Pipeline::Handles& h) {
   std::vector<vk::DescriptorSetLayoutBinding> bindings;
   for (std::uint32_t i = 0; i < h.interface.buffers; ++i)
-    bindings.emplace_back(i, vk::DescriptorType::eStorageBuffer, 1, h.stages);
+    bindings.emplace_back(i, buffer_type(h.interface, i), 1, h.stages);
   const auto& device = h.context->device;
   h.set_layout = vk::raii::DescriptorSetLayout(
       device, {vk::DescriptorSetLayoutCreateFlagBits::ePushDescriptorKHR, bindings});
@@ -59,32 +59,39 @@ void create_kernel(Pipeline::Handles& h,
       h.context->device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *h.layout));
 }
 
-/// Both sides of a triangle are drawn, the nearest kept; nothing is blended.
+/// The nearest is kept; nothing is blended. Without a fragment shader there is only depth.
 void create_drawing(Pipeline::Handles& h,
                     std::span<const std::uint32_t> vertex,
-                    std::span<const std::uint32_t> fragment) {
+                    std::span<const std::uint32_t> fragment,
+                    Sides sides) {
   create_layout(h);
   const auto vertex_module = module_of(*h.context, vertex);
-  const auto fragment_module = module_of(*h.context, fragment);
-  const std::array stages{
-      vk::PipelineShaderStageCreateInfo({}, Stage::eVertex, *vertex_module, "main"),
-      vk::PipelineShaderStageCreateInfo({}, Stage::eFragment, *fragment_module, "main")};
+  std::vector stages{vk::PipelineShaderStageCreateInfo({}, Stage::eVertex, *vertex_module, "main")};
+  vk::raii::ShaderModule fragment_module = nullptr;
+  if (!fragment.empty()) {
+    fragment_module = module_of(*h.context, fragment);
+    stages.emplace_back(
+        vk::PipelineShaderStageCreateFlags(), Stage::eFragment, *fragment_module, "main");
+  }
   const vk::PipelineVertexInputStateCreateInfo no_input;
   const vk::PipelineInputAssemblyStateCreateInfo triangles({},
                                                            vk::PrimitiveTopology::eTriangleList);
   const vk::PipelineViewportStateCreateInfo viewport({}, 1, nullptr, 1, nullptr);
   vk::PipelineRasterizationStateCreateInfo raster;
   raster.setLineWidth(1.0F);
+  if (sides == Sides::kFront) raster.setCullMode(vk::CullModeFlagBits::eBack);
   const vk::PipelineMultisampleStateCreateInfo one_sample;
   const vk::PipelineDepthStencilStateCreateInfo depth(
       {}, VK_TRUE, VK_TRUE, vk::CompareOp::eGreaterOrEqual);
   vk::PipelineColorBlendAttachmentState write;
   write.setColorWriteMask(vk::FlagTraits<vk::ColorComponentFlagBits>::allFlags);
   vk::PipelineColorBlendStateCreateInfo blend;
-  blend.setAttachments(write);
+  if (!fragment.empty()) blend.setAttachments(write);
   static constexpr std::array dynamic{vk::DynamicState::eViewport, vk::DynamicState::eScissor};
   const vk::PipelineDynamicStateCreateInfo dynamic_state({}, dynamic);
-  const vk::PipelineRenderingCreateInfo formats(0, kColorFormat, kDepthFormat);
+  vk::PipelineRenderingCreateInfo formats;
+  formats.setDepthAttachmentFormat(kDepthFormat);
+  if (!fragment.empty()) formats.setColorAttachmentFormats(kColorFormat);
   vk::GraphicsPipelineCreateInfo info({},
                                       stages,
                                       &no_input,
@@ -123,10 +130,22 @@ Result<Pipeline> Pipeline::create_raster(Context& context,
                                          std::string_view name,
                                          std::span<const std::uint32_t> vertex_spirv,
                                          std::span<const std::uint32_t> fragment_spirv,
-                                         const Interface& interface) {
+                                         const Interface& interface,
+                                         Sides sides) {
   auto h = handles_for(context, interface, Stage::eVertex | Stage::eFragment);
   auto made = guarded(fmt::format("shaders of {}", name),
-                      [&] { create_drawing(*h, vertex_spirv, fragment_spirv); });
+                      [&] { create_drawing(*h, vertex_spirv, fragment_spirv, sides); });
+  if (!made) return made.error();
+  return Pipeline(std::move(h));
+}
+
+Result<Pipeline> Pipeline::create_depth(Context& context,
+                                        std::string_view name,
+                                        std::span<const std::uint32_t> vertex_spirv,
+                                        const Interface& interface) {
+  auto h = handles_for(context, interface, Stage::eVertex);
+  auto made = guarded(fmt::format("shader of {}", name),
+                      [&] { create_drawing(*h, vertex_spirv, {}, Sides::kBoth); });
   if (!made) return made.error();
   return Pipeline(std::move(h));
 }
