@@ -88,39 +88,49 @@ struct Hierarchy<T>::Level {
   std::vector<Lanes<T>> b;
   std::vector<Lanes<T>> x;
   std::vector<Lanes<T>> next;
-  std::vector<Lanes<T>> d;
+  std::vector<Lanes<T>> d;  // empty where there is one step
   std::size_t finest_entries = 0;
 
   Level(const LaneMatrix<T>& a, int steps)
       : inverse(inverse_diagonal(a)), factors(chebyshev(steps, largest_eigenvalue(a, inverse))) {
     const std::vector<Lanes<T>> zeros(a.rows(), Lanes<T>::zero());
-    b = x = next = d = zeros;
+    b = x = next = zeros;
+    if (steps > 1) d = zeros;
     finest_entries = a.columns.size() + a.sinks.size();
   }
 
   /// x from zero.
-  void first_step(int rows, ThreadTeam& team) {
+  void first_step(const std::vector<Lanes<T>>& right, ThreadTeam& team) {
     const auto take = static_cast<T>(factors.take[0]);
-    over_rows(rows, team, [&](RowRange range) {
-      for (int i = range.first; i < range.last; ++i) x[i] = d[i] = inverse[i] * b[i] * take;
+    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
+      for (int i = range.first; i < range.last; ++i) x[i] = inverse[i] * right[i] * take;
+      if (d.empty()) return;
+      for (int i = range.first; i < range.last; ++i) d[i] = x[i];
     });
   }
 
-  void step(const LaneMatrix<T>& a, std::size_t k, ThreadTeam& team) {
+  /// `row(x, i)` is row i of A x; `out` gets the step's result.
+  template <class Row>
+  void step(const std::vector<Lanes<T>>& right,
+            const Row& row,
+            std::size_t k,
+            std::vector<Lanes<T>>& out,
+            ThreadTeam& team) {
     const auto keep = static_cast<T>(factors.keep[k]);
     const auto take = static_cast<T>(factors.take[k]);
-    over_rows(a.rows(), team, [&](RowRange range) {
+    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
       for (int i = range.first; i < range.last; ++i) {
-        d[i] = d[i] * keep + inverse[i] * (b[i] - apply_row(a, x.data(), i)) * take;
-        next[i] = x[i] + d[i];
+        Lanes<T> move = inverse[i] * (right[i] - row(x.data(), i)) * take;
+        if (!d.empty()) move = d[i] = k > 0 ? d[i] * keep + move : move;
+        out[i] = x[i] + move;
       }
     });
-    std::swap(x, next);
   }
 
-  void residual(const LaneMatrix<T>& a, ThreadTeam& team) {
-    over_rows(a.rows(), team, [&](RowRange range) {
-      for (int i = range.first; i < range.last; ++i) next[i] = b[i] - apply_row(a, x.data(), i);
+  template <class Row>
+  void residual(const std::vector<Lanes<T>>& right, const Row& row, ThreadTeam& team) {
+    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
+      for (int i = range.first; i < range.last; ++i) next[i] = right[i] - row(x.data(), i);
     });
   }
 
@@ -220,7 +230,7 @@ struct Hierarchy<T>::Coarsest {
 
 template <class T>
 Hierarchy<T>::Hierarchy(const LaneMatrix<T>& finest, const HierarchyOptions& options)
-    : options_(options) {
+    : options_(options), rough_(rough_entries(finest)) {
   const LaneMatrix<T>* a = &finest;
   double strength = options.strength;
   levels_.reserve(kMostLevels);
@@ -247,29 +257,44 @@ Hierarchy<T>::Hierarchy(Hierarchy&&) noexcept = default;
 template <class T>
 Hierarchy<T>& Hierarchy<T>::operator=(Hierarchy&&) noexcept = default;
 
+/// From the level's own right-hand side into `out`.
 template <class T>
-const LaneMatrix<T>& Hierarchy<T>::matrix(std::size_t level) const {
-  return level == 0 ? *finest_ : levels_[level].matrix;
+template <class Row>
+void Hierarchy<T>::cycle(std::size_t level,
+                         const std::vector<Lanes<T>>& right,
+                         const Row& row,
+                         std::vector<Lanes<T>>& out,
+                         ThreadTeam& team) {
+  Level& here = levels_[level];
+  const std::size_t steps = here.factors.take.size();
+  here.first_step(right, team);
+  for (std::size_t k = 1; k < steps; ++k) {
+    here.step(right, row, k, here.next, team);
+    std::swap(here.x, here.next);
+  }
+  if (level + 1 < levels_.size()) {
+    here.residual(right, row, team);
+    here.restrict_to(levels_[level + 1], team);
+    descend(level + 1, team);
+    here.add_from(levels_[level + 1], team);
+  }
+  for (std::size_t k = 0; k + 1 < steps; ++k) {
+    here.step(right, row, k, here.next, team);
+    std::swap(here.x, here.next);
+  }
+  here.step(right, row, steps - 1, out, team);
 }
 
 template <class T>
 void Hierarchy<T>::descend(std::size_t level, ThreadTeam& team) {
   Level& here = levels_[level];
-  const LaneMatrix<T>& a = matrix(level);
-  const bool last = level + 1 == levels_.size();
-  if (last && coarsest_ != nullptr) {
+  if (level + 1 == levels_.size() && coarsest_ != nullptr) {
     coarsest_->apply(here.b, here.x);
     return;
   }
-  here.first_step(a.rows(), team);
-  for (std::size_t k = 1; k < here.factors.take.size(); ++k) here.step(a, k, team);
-  if (!last) {
-    here.residual(a, team);
-    here.restrict_to(levels_[level + 1], team);
-    descend(level + 1, team);
-    here.add_from(levels_[level + 1], team);
-  }
-  for (std::size_t k = 0; k < here.factors.take.size(); ++k) here.step(a, k, team);
+  const auto row = [&a = here.matrix](const Lanes<T>* x, int i) { return apply_row(a, x, i); };
+  cycle(level, here.b, row, here.next, team);
+  std::swap(here.x, here.next);
 }
 
 template <class T>
@@ -277,10 +302,17 @@ void Hierarchy<T>::precondition(const LaneMatrix<T>& finest,
                                 const std::vector<Lanes<T>>& r,
                                 std::vector<Lanes<T>>& z,
                                 ThreadTeam& team) {
-  finest_ = &finest;
-  levels_[0].b = r;
-  descend(0, team);
-  z = levels_[0].x;
+  if (levels_.size() == 1 && coarsest_ != nullptr) {
+    coarsest_->apply(r, z);
+    return;
+  }
+  const auto row = [&](const Lanes<T>* x, int i) { return apply_rough_row(finest, rough_, x, i); };
+  cycle(0, r, row, z, team);
+}
+
+template <class T>
+void Hierarchy<T>::matrix_changed(const LaneMatrix<T>& finest) {
+  rough_ = rough_entries(finest);
 }
 
 template <class T>

@@ -6,6 +6,7 @@
 #include "base/thread_team.h"
 #include "render/solver/aggregation.h"
 #include "render/solver/lane_matrix.h"
+#include "render/solver/rough_matrix.h"
 
 namespace opaline::render {
 
@@ -36,12 +37,15 @@ class Hierarchy {
   Hierarchy(Hierarchy&&) noexcept;
   Hierarchy& operator=(Hierarchy&&) noexcept;
 
-  /// z = B r, with B about A^-1. `finest` is the matrix as it is now, of the
-  /// same pattern.
+  /// z = B r, with B about A^-1. `finest` is the matrix as it was told last, by the constructor or by matrix_changed(). z and r
+  /// are two vectors, of its rows.
   void precondition(const LaneMatrix<T>& finest,
                     const std::vector<Lanes<T>>& r,
                     std::vector<Lanes<T>>& z,
                     ThreadTeam& team);
+
+  /// The finest matrix has other entries in the same pattern: it is smoothed by those, and coarser levels stay.
+  void matrix_changed(const LaneMatrix<T>& finest);
 
   int levels() const;
   /// Entries of all levels over entries of the finest: what a cycle costs.
@@ -50,11 +54,16 @@ class Hierarchy {
  private:
   struct Level;
   struct Coarsest;
+  template <class Row>
+  void cycle(std::size_t level,
+             const std::vector<Lanes<T>>& right,
+             const Row& row,
+             std::vector<Lanes<T>>& out,
+             ThreadTeam& team);
   void descend(std::size_t level, ThreadTeam& team);
-  const LaneMatrix<T>& matrix(std::size_t level) const;
 
   HierarchyOptions options_;
-  const LaneMatrix<T>* finest_ = nullptr;  // during precondition()
+  RoughEntries<T> rough_;  // of the finest matrix
   std::vector<Level> levels_;
   std::unique_ptr<Coarsest> coarsest_;
 };

@@ -39,7 +39,10 @@ class LaneSolver {
 
   /// The hierarchy stays, and serves until the matrix has changed much. One product for every remembered solution: the next start
   /// is their best combination for the new matrix.
-  void matrix_changed() { history_.refresh(matrix_, team_); }
+  void matrix_changed() {
+    hierarchy_.matrix_changed(matrix_);
+    history_.refresh(matrix_, team_);
+  }
   /// Starts from x alone next time.
   void forget() { history_.clear(); }
   void rebuild(const HierarchyOptions& options) { hierarchy_ = Hierarchy<T>(matrix_, options); }
