@@ -9,7 +9,8 @@ namespace opaline::render {
 namespace {
 
 constexpr int kLeaf = 4;
-constexpr double kFar = 2.0;  // in radii of a group
+constexpr int kLookUp = 4096;  // fewer triangles are sorted without a look at the stop token
+constexpr double kFar = 2.0;   // in radii of a group
 
 double component(Vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
@@ -58,14 +59,17 @@ double solid_angle(Vec3 a, Vec3 b, Vec3 c) {
 
 }  // namespace
 
-Result<std::unique_ptr<MeshDistance>> MeshDistance::create(const TriangleMesh& mesh) {
+Result<std::unique_ptr<MeshDistance>> MeshDistance::create(const TriangleMesh& mesh,
+                                                           const std::stop_token& stop) {
   if (auto valid = validate(mesh); !valid) return valid.error();
-  auto distance = std::unique_ptr<MeshDistance>(new MeshDistance(mesh));
+  auto distance = std::unique_ptr<MeshDistance>(new MeshDistance(mesh, stop));
+  if (stop.stop_requested()) return cancelled("sorting the triangles of a mesh");
   if (distance->triangles_.empty()) return invalid_argument("no triangle of the mesh has an area");
   return distance;
 }
 
-MeshDistance::MeshDistance(const TriangleMesh& mesh) : bounds_(opaline::render::bounds(mesh)) {
+MeshDistance::MeshDistance(const TriangleMesh& mesh, const std::stop_token& stop)
+    : bounds_(opaline::render::bounds(mesh)) {
   triangles_.reserve(mesh.triangles.size());
   const Vec3 centre = bounds_.centre();
   double volume = 0.0;
@@ -78,7 +82,7 @@ MeshDistance::MeshDistance(const TriangleMesh& mesh) : bounds_(opaline::render::
   }
   orientation_ = volume < 0.0 ? -1.0 : 1.0;
   nodes_.reserve(triangles_.size());
-  if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
+  if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()), stop);
 }
 
 void MeshDistance::summarise(Node& node, int first, int last) const {
@@ -98,13 +102,13 @@ void MeshDistance::summarise(Node& node, int first, int last) const {
   node.radius = length(reach);
 }
 
-int MeshDistance::build(int first, int last) {
+int MeshDistance::build(int first, int last, const std::stop_token& stop) {
   const auto index = static_cast<int>(nodes_.size());
   nodes_.emplace_back();
   Node node;
   summarise(node, first, last);
   node.first = first;
-  if (last - first <= kLeaf) {
+  if (last - first <= kLeaf || (last - first > kLookUp && stop.stop_requested())) {
     node.count = last - first;
   } else {
     const Vec3 size = node.box.size();
@@ -116,8 +120,8 @@ int MeshDistance::build(int first, int last) {
                      [axis](const Triangle& s, const Triangle& t) {
                        return component(s.a + s.b + s.c, axis) < component(t.a + t.b + t.c, axis);
                      });
-    build(first, middle);
-    node.right = build(middle, last);
+    build(first, middle, stop);
+    node.right = build(middle, last, stop);
   }
   nodes_[index] = node;
   return index;

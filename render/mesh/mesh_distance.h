@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "render/mesh/signed_distance.h"
@@ -22,8 +23,9 @@ namespace opaline::render {
 /// Both sums go through one tree of bounding boxes: some microseconds a point for 100,000 triangles.
 class MeshDistance final : public SignedDistance {
  public:
-  /// Errors: kInvalidArgument for what validate() refuses, and where all triangles are without area.
-  static Result<std::unique_ptr<MeshDistance>> create(const TriangleMesh& mesh);
+  /// Errors: kInvalidArgument for what validate() refuses, and where all triangles are without area; kCancelled.
+  static Result<std::unique_ptr<MeshDistance>> create(const TriangleMesh& mesh,
+                                                      const std::stop_token& stop = {});
 
   double at(Vec3 point) const override;
   Box bounds() const override { return bounds_; }
@@ -46,8 +48,8 @@ class MeshDistance final : public SignedDistance {
     int count = 0;        // 0: an inner node
     int right = 0;        // second child; the first follows its parent
   };
-  explicit MeshDistance(const TriangleMesh& mesh);
-  int build(int first, int last);
+  MeshDistance(const TriangleMesh& mesh, const std::stop_token& stop);
+  int build(int first, int last, const std::stop_token& stop);
   void summarise(Node& node, int first, int last) const;
 
   std::vector<Triangle> triangles_;

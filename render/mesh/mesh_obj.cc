@@ -47,11 +47,13 @@ Result<void> add_face(std::string_view words,
 
 }  // namespace
 
-Result<TriangleMesh> decode_obj(std::string_view text) {
+Result<TriangleMesh> decode_obj(std::string_view text, const std::stop_token& stop) {
   TriangleMesh mesh;
   TextScanner scanner(text);
   std::vector<int> corners;
   while (auto line = scanner.next_line()) {
+    if (stopped_at(static_cast<std::size_t>(scanner.line()), stop))
+      return cancelled("reading the mesh");
     std::string_view words = line->substr(0, line->find('#'));
     const std::string_view keyword = TextScanner::word_of(words);
     if (keyword == "v") {

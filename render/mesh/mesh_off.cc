@@ -52,19 +52,21 @@ Result<void> read_face(TextScanner& scanner, std::vector<int>& corners, Triangle
 
 }  // namespace
 
-Result<TriangleMesh> decode_off(std::string_view text) {
+Result<TriangleMesh> decode_off(std::string_view text, const std::stop_token& stop) {
   TextScanner scanner(text);
   const auto counts = read_counts(scanner, text.size());
   if (!counts) return counts.error();
   TriangleMesh mesh;
   mesh.vertices.reserve(counts->vertices);
   for (long v = 0; v < counts->vertices; ++v) {
+    if (stopped_at(static_cast<std::size_t>(v), stop)) return cancelled("reading the mesh");
     const auto point = scanner.next_point();
     if (!point) return point.error();
     mesh.vertices.push_back(*point);
   }
   std::vector<int> corners;
   for (long f = 0; f < counts->faces; ++f) {
+    if (stopped_at(static_cast<std::size_t>(f), stop)) return cancelled("reading the mesh");
     if (auto read = read_face(scanner, corners, mesh); !read) return read.error();
   }
   return mesh;

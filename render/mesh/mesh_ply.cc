@@ -204,7 +204,7 @@ bool read_element(const Element& element,
 
 }  // namespace
 
-Result<TriangleMesh> decode_ply(std::string_view bytes) {
+Result<TriangleMesh> decode_ply(std::string_view bytes, const std::stop_token& stop) {
   TextScanner scanner(bytes);
   const auto header = parse_header(scanner);
   if (!header) return header.error();
@@ -214,6 +214,7 @@ Result<TriangleMesh> decode_ply(std::string_view bytes) {
   for (const Element& element : header->elements) {
     if (element.properties.empty()) continue;
     for (std::size_t i = 0; i < element.count; ++i) {
+      if (stopped_at(i, stop)) return cancelled("reading the mesh");
       if (!read_element(element, numbers, corners, mesh)) {
         return invalid_argument(fmt::format("{}{} {} of {} is damaged or cut off",
                                             numbers.where(),

@@ -31,7 +31,7 @@ void add_triangle(TriangleMesh& mesh) {
   mesh.triangles.push_back({n - 3, n - 2, n - 1});
 }
 
-Result<TriangleMesh> decode_binary(std::string_view bytes) {
+Result<TriangleMesh> decode_binary(std::string_view bytes, const std::stop_token& stop) {
   const std::size_t count = triangle_count(bytes);
   if (bytes.size() < kHeader)
     return invalid_argument("ends within the header of a binary STL file");
@@ -45,6 +45,7 @@ Result<TriangleMesh> decode_binary(std::string_view bytes) {
   mesh.vertices.reserve(3 * count);
   mesh.triangles.reserve(count);
   for (std::size_t t = 0; t < count; ++t) {
+    if (stopped_at(t, stop)) return cancelled("reading the mesh");
     std::array<std::array<float, 3>, 3> corners{};
     std::memcpy(corners.data(), bytes.data() + kHeader + kRecord * t + 12, sizeof corners);
     for (const auto& [x, y, z] : corners) mesh.vertices.push_back({x, y, z});
@@ -53,10 +54,12 @@ Result<TriangleMesh> decode_binary(std::string_view bytes) {
   return mesh;
 }
 
-Result<TriangleMesh> decode_text(std::string_view text) {
+Result<TriangleMesh> decode_text(std::string_view text, const std::stop_token& stop) {
   TriangleMesh mesh;
   TextScanner scanner(text);
   while (auto line = scanner.next_line()) {
+    if (stopped_at(static_cast<std::size_t>(scanner.line()), stop))
+      return cancelled("reading the mesh");
     std::string_view words = *line;
     if (TextScanner::word_of(words) != "vertex") continue;
     Vec3 p;
@@ -75,10 +78,12 @@ Result<TriangleMesh> decode_text(std::string_view text) {
 
 }  // namespace
 
-Result<TriangleMesh> decode_stl(std::string_view bytes) {
-  auto mesh = is_text(bytes) ? decode_text(bytes) : decode_binary(bytes);
+Result<TriangleMesh> decode_stl(std::string_view bytes, const std::stop_token& stop) {
+  auto mesh = is_text(bytes) ? decode_text(bytes, stop) : decode_binary(bytes, stop);
   if (!mesh) return mesh.error();
-  return weld(*mesh);
+  TriangleMesh welded = weld(*mesh, stop);
+  if (stop.stop_requested()) return cancelled("reading the mesh");
+  return welded;
 }
 
 }  // namespace opaline::render

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stop_token>
 #include <string_view>
 
 #include "base/result.h"
@@ -17,11 +18,15 @@ namespace opaline::render {
 ///
 /// Polygons are cut into fans. Coordinates are multiplied by `millimetres`, the length of the file's unit.
 /// Errors: kNotFound; kInvalidArgument, with file and line (or, in binary files, the element), for what is damaged, names
-///         vertices that are not there, has no triangles, or more than kMostTriangles.
+///         vertices that are not there, has no triangles, or more than kMostTriangles; kCancelled.
 inline constexpr std::size_t kMostTriangles = 20'000'000;
-Result<TriangleMesh> read_mesh(const std::filesystem::path& path, double millimetres = 1.0);
+Result<TriangleMesh> read_mesh(const std::filesystem::path& path,
+                               double millimetres = 1.0,
+                               const std::stop_token& stop = {});
 
 /// The same from memory; formats by name: "obj", "off", "ply", "stl".
-Result<TriangleMesh> decode_mesh(std::string_view format, std::string_view bytes);
+Result<TriangleMesh> decode_mesh(std::string_view format,
+                                 std::string_view bytes,
+                                 const std::stop_token& stop = {});
 
 }  // namespace opaline::render

@@ -6,9 +6,13 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <numeric>
+#include <span>
 #include <tuple>
 #include <unordered_map>
+
+#include "render/mesh/mesh_formats.h"
 
 namespace opaline::render {
 namespace {
@@ -28,39 +32,62 @@ struct PlaceHash {
 
 bool is_finite(Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
-struct DirectedEdge {
-  int low = 0;
-  int high = 0;
-  bool forward = true;
-};
+/// The edges of a mesh, those that have the same lower vertex side by side.
+class DirectedEdges {
+ public:
+  struct Edge {
+    int high = 0;
+    bool forward = true;
+    bool operator<(const Edge& other) const {
+      return std::tie(high, forward) < std::tie(other.high, other.forward);
+    }
+  };
 
-std::vector<DirectedEdge> sorted_edges(const TriangleMesh& mesh) {
-  std::vector<DirectedEdge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = t[k];
-      const int b = t[(k + 1) % 3];
-      if (a != b) edges.push_back({std::min(a, b), std::max(a, b), a < b});
+  explicit DirectedEdges(const TriangleMesh& mesh) : starts_(mesh.vertices.size() + 1) {
+    for_each(mesh, [&](int low, Edge) { ++starts_[low + 1]; });
+    std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+    edges_.resize(starts_.back());
+    std::vector<std::size_t> next(starts_.begin(), starts_.end() - 1);
+    for_each(mesh, [&](int low, Edge edge) { edges_[next[low]++] = edge; });
+  }
+  /// Sorted.
+  std::span<Edge> of(std::size_t low) {
+    const std::span<Edge> found(edges_.data() + starts_[low], starts_[low + 1] - starts_[low]);
+    std::ranges::sort(found, std::less<>());
+    return found;
+  }
+
+ private:
+  template <class Work>
+  static void for_each(const TriangleMesh& mesh, const Work& work) {
+    for (const auto& t : mesh.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        const int a = t[k];
+        const int b = t[(k + 1) % 3];
+        if (a != b) work(std::min(a, b), Edge{std::max(a, b), a < b});
+      }
     }
   }
-  std::ranges::sort(
-      edges, {}, [](const DirectedEdge& e) { return std::tie(e.low, e.high, e.forward); });
-  return edges;
-}
+  std::vector<std::size_t> starts_;
+  std::vector<Edge> edges_;
+};
 
 /// Counts what is wrong along the edges; answers how many different edges there are.
-std::size_t count_edges(const TriangleMesh& mesh, MeshTopology& found) {
-  const std::vector<DirectedEdge> edges = sorted_edges(mesh);
+std::size_t count_edges(const TriangleMesh& mesh,
+                        MeshTopology& found,
+                        const std::stop_token& stop) {
+  DirectedEdges all(mesh);
   std::size_t different = 0;
-  for (std::size_t i = 0; i < edges.size(); ++different) {
-    std::size_t end = i + 1;
-    while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high)
-      ++end;
-    if (end - i == 1) ++found.open_edges;
-    if (end - i > 2) ++found.crowded_edges;
-    if (end - i == 2 && edges[i].forward == edges[i + 1].forward) ++found.flipped_edges;
-    i = end;
+  for (std::size_t v = 0; v < mesh.vertices.size() && !stopped_at(v, stop); ++v) {
+    const auto edges = all.of(v);
+    for (std::size_t i = 0; i < edges.size(); ++different) {
+      std::size_t end = i + 1;
+      while (end < edges.size() && edges[end].high == edges[i].high) ++end;
+      if (end - i == 1) ++found.open_edges;
+      if (end - i > 2) ++found.crowded_edges;
+      if (end - i == 2 && edges[i].forward == edges[i + 1].forward) ++found.flipped_edges;
+      i = end;
+    }
   }
   return different;
 }
@@ -113,7 +140,7 @@ Result<void> validate(const TriangleMesh& mesh) {
   return ok();
 }
 
-MeshTopology topology(const TriangleMesh& mesh) {
+MeshTopology topology(const TriangleMesh& mesh, const std::stop_token& stop) {
   MeshTopology found;
   for (const auto& t : mesh.triangles) {
     const Vec3 a = mesh.vertices[t[0]];
@@ -122,7 +149,8 @@ MeshTopology topology(const TriangleMesh& mesh) {
     found.area += 0.5 * length(normal);
     found.volume += dot(a, normal) / 6.0;
   }
-  const std::size_t edges = count_edges(mesh, found);
+  const std::size_t edges = count_edges(mesh, found, stop);
+  if (stop.stop_requested()) return found;
   const Parts parts = count_parts(mesh);
   found.components = parts.components;
   const long euler = static_cast<long>(parts.used_vertices) - static_cast<long>(edges) +
@@ -131,12 +159,13 @@ MeshTopology topology(const TriangleMesh& mesh) {
   return found;
 }
 
-TriangleMesh weld(const TriangleMesh& mesh) {
+TriangleMesh weld(const TriangleMesh& mesh, const std::stop_token& stop) {
   TriangleMesh welded;
   welded.triangles.reserve(mesh.triangles.size());
   std::unordered_map<Vec3, int, PlaceHash> places;
   places.reserve(mesh.vertices.size());
   for (const auto& t : mesh.triangles) {
+    if (stopped_at(welded.triangles.size(), stop)) return welded;
     std::array<int, 3> corners{};
     for (int k = 0; k < 3; ++k) {
       const Vec3 p = mesh.vertices[t[k]] + Vec3{};  // -0 becomes 0

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <stop_token>
 #include <vector>
 
 #include "base/pose.h"
@@ -43,10 +44,11 @@ struct MeshTopology {
 };
 
 /// Needs a valid mesh. Corners that coincide count as one only where they are one vertex: see weld().
-MeshTopology topology(const TriangleMesh& mesh);
+/// Asked to stop, it answers something else soon.
+MeshTopology topology(const TriangleMesh& mesh, const std::stop_token& stop = {});
 
-/// The mesh with vertices at exactly the same place made one, unused ones dropped.
-TriangleMesh weld(const TriangleMesh& mesh);
+/// The mesh with vertices at exactly the same place made one, unused ones dropped. Asked to stop, it answers a part soon.
+TriangleMesh weld(const TriangleMesh& mesh, const std::stop_token& stop = {});
 
 Box bounds(const TriangleMesh& mesh);
 

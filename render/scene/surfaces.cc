@@ -32,8 +32,8 @@ void Surfaces::move(int object,
   tree_->refit();
 }
 
-Result<void> Surfaces::build() {
-  auto tree = TriangleTree::create(mesh_);
+Result<void> Surfaces::build(const std::stop_token& stop) {
+  auto tree = TriangleTree::create(mesh_, stop);
   if (!tree) return tree.error();
   tree_.emplace(*std::move(tree));
   return ok();

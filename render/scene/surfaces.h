@@ -30,7 +30,7 @@ class Surfaces {
   /// Moves an object's vertices; the tree keeps its order. Needs as many as were added, and build().
   void move(int object, const std::vector<Vec3>& vertices, const std::vector<Vec3>& normals);
   /// Call after the last add(). Errors: see TriangleTree.
-  Result<void> build();
+  Result<void> build(const std::stop_token& stop = {});
 
   struct Hit {
     int object = 0;

@@ -8,6 +8,7 @@ namespace opaline::render {
 namespace {
 
 constexpr int kLeaf = 4;
+constexpr int kLookUp = 4096;  // fewer triangles are sorted without a look at the stop token
 constexpr double kRim = 1e-12;
 
 double along(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
@@ -42,14 +43,17 @@ bool meets(const Box& box, const Ray& ray, double enter, double leave) {
 
 }  // namespace
 
-Result<TriangleTree> TriangleTree::create(const TriangleMesh& mesh) {
+Result<TriangleTree> TriangleTree::create(const TriangleMesh& mesh, const std::stop_token& stop) {
   if (auto valid = validate(mesh); !valid) return valid.error();
-  return TriangleTree(mesh);
+  TriangleTree tree(mesh, stop);
+  if (stop.stop_requested()) return cancelled("sorting triangles for rays");
+  return tree;
 }
 
-TriangleTree::TriangleTree(const TriangleMesh& mesh) : mesh_(&mesh), order_(mesh.triangles.size()) {
+TriangleTree::TriangleTree(const TriangleMesh& mesh, const std::stop_token& stop)
+    : mesh_(&mesh), order_(mesh.triangles.size()) {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
-  build(0, static_cast<int>(order_.size()));
+  build(0, static_cast<int>(order_.size()), stop);
 }
 
 Vec3 TriangleTree::corner(std::size_t triangle, int k) const {
@@ -85,11 +89,11 @@ void TriangleTree::refit() {
   }
 }
 
-int TriangleTree::build(int first, int last) {
+int TriangleTree::build(int first, int last, const std::stop_token& stop) {
   const int own = static_cast<int>(nodes_.size());
   const Box box = box_of(first, last);
   nodes_.push_back({box, first, last - first, 0});
-  if (last - first <= kLeaf) return own;
+  if (last - first <= kLeaf || (last - first > kLookUp && stop.stop_requested())) return own;
   const int axis = longest_axis(box.size());
   const int middle = first + (last - first) / 2;
   std::nth_element(order_.begin() + first,
@@ -99,8 +103,8 @@ int TriangleTree::build(int first, int last) {
                      return along(centre(a), axis) < along(centre(b), axis);
                    });
   nodes_[own].count = 0;
-  build(first, middle);
-  const int right = build(middle, last);
+  build(first, middle, stop);
+  const int right = build(middle, last, stop);
   nodes_[own].right = right;
   return own;
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "render/mesh/triangle_mesh.h"
@@ -29,8 +30,8 @@ struct RayHit {
 /// Threads: queries may run at once.
 class TriangleTree {
  public:
-  /// The mesh must outlive it. Errors: kInvalidArgument, see validate().
-  static Result<TriangleTree> create(const TriangleMesh& mesh);
+  /// The mesh must outlive it. Errors: kInvalidArgument, see validate(); kCancelled.
+  static Result<TriangleTree> create(const TriangleMesh& mesh, const std::stop_token& stop = {});
 
   /// The mesh's vertices have moved: the boxes follow, the order stays, which costs speed where triangles that were near
   /// each other no longer are.
@@ -51,8 +52,8 @@ class TriangleTree {
     int right = 0;  // second child; the first follows its parent
   };
 
-  explicit TriangleTree(const TriangleMesh& mesh);
-  int build(int first, int last);
+  TriangleTree(const TriangleMesh& mesh, const std::stop_token& stop);
+  int build(int first, int last, const std::stop_token& stop);
   Box box_of(int first, int last) const;
   Vec3 corner(std::size_t triangle, int k) const;
   Vec3 centre(std::size_t triangle) const;

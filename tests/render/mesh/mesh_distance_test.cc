@@ -111,5 +111,13 @@ TEST(Shapes, ChangeNoFasterThanThePointMovesAndLieInTheirBounds) {
   EXPECT_FALSE(make_shape("sphere", 0.0));
 }
 
+TEST(MeshDistance, StopsWhenAsked) {
+  std::stop_source stop;
+  stop.request_stop();
+  const auto distance = MeshDistance::create(sphere_mesh(10.0, 60), stop.get_token());
+  ASSERT_FALSE(distance);
+  EXPECT_EQ(distance.error().code, ErrorCode::kCancelled);
+}
+
 }  // namespace
 }  // namespace opaline::render

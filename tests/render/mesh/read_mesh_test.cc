@@ -198,5 +198,27 @@ TEST(Topology, HolesFlippedAndCrowdedEdgesAndPartsAreCounted) {
   EXPECT_EQ(topology(mesh).degenerate_triangles, 1U);
 }
 
+TEST(ReadMesh, StopsWhenAskedInEveryFormat) {
+  std::stop_source stop;
+  stop.request_stop();
+  std::string obj;
+  std::string off = "OFF\n70000 1 0\n";
+  for (int i = 0; i < 70'000; ++i) {
+    obj += "v 0 0 0\n";
+    off += "0 0 0\n";
+  }
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n";
+  std::string stl(84, '\0');
+  stl[80] = 1;
+  stl += std::string(50, '\0');
+  for (const auto& [format, bytes] :
+       {std::pair{"obj", obj}, {"off", off}, {"ply", ply}, {"stl", stl}}) {
+    const auto mesh = decode_mesh(format, bytes, stop.get_token());
+    ASSERT_FALSE(mesh) << format;
+    EXPECT_EQ(mesh.error().code, ErrorCode::kCancelled) << format << ": " << mesh.error().message;
+  }
+}
+
 }  // namespace
 }  // namespace opaline::render
