@@ -1,10 +1,12 @@
 #include "bench/render/sphere_error.h"
 
 #include <cmath>
+#include <type_traits>
 
 #include "base/ensure.h"
 #include "bench/render/render_case.h"
 #include "render/graph/finite_elements.h"
+#include "render/graph/leaning_links.h"
 #include "render/graph/polygrid.h"
 #include "tests/render/graph/lit_sphere.h"
 
@@ -40,7 +42,10 @@ std::array<float, 3> light(Vec3 place) {
 }
 
 template <class Graph>
-double two_point_error(const Graph& graph, ThreadTeam& team) {
+double two_point_error(const Graph& graph,
+                       const render::TetMesh& mesh,
+                       int corrections,
+                       ThreadTeam& team) {
   render::TwoPoint<double, Graph> diffusion(graph, render_boundary());
   ENSURE(diffusion.set_material(std::vector(graph.inner.size(), plain_optics())).has_value());
   std::vector<std::array<float, 3>> q;
@@ -49,8 +54,21 @@ double two_point_error(const Graph& graph, ThreadTeam& team) {
   std::vector<Lanes<double>> b;
   diffusion.load(q, b);
   std::vector<Lanes<double>> phi(b.size(), Lanes<double>::zero());
-  render::LaneSolver<double>(diffusion.matrix(), {}, team).solve(b, phi, kExact, {});
-  const render::SurfaceLight out = diffusion.surface_light(q, phi);
+  render::LaneSolver<double> solver(diffusion.matrix(), {}, team);
+  const auto solve = [&](const auto& load, double tolerance) {
+    return solver.solve(
+        load, phi, {.tolerance = tolerance, .max_iterations = kExact.max_iterations}, {});
+  };
+  render::SurfaceLight out;
+  if constexpr (std::is_same_v<Graph, render::QuadGraph>) {
+    render::LeaningLinks<double> lean(mesh, graph, render_boundary(), team);
+    lean.update(std::vector(graph.inner.size(), plain_optics()));
+    lean.settle(q, b, phi, kExact.tolerance, corrections, solve);
+    out = diffusion.surface_light(q, phi, lean.at_surface());
+  } else {
+    solve(b, kExact.tolerance);
+    out = diffusion.surface_light(q, phi);
+  }
   SphereError error;
   for (std::size_t s = 0; s < q.size(); ++s) {
     error.add(graph.surface[s].place, out.fluence[s][0], graph.surface[s].area);
@@ -60,14 +78,14 @@ double two_point_error(const Graph& graph, ThreadTeam& team) {
 
 }  // namespace
 
-double graph_error(const render::TetMesh& sphere, ThreadTeam& team) {
-  return two_point_error(render::make_quad_graph(sphere), team);
+double graph_error(const render::TetMesh& sphere, int corrections, ThreadTeam& team) {
+  return two_point_error(render::make_quad_graph(sphere), sphere, corrections, team);
 }
 
 double polygrid_error(const render::SignedDistance& sphere, double spacing, ThreadTeam& team) {
   const auto grid = render::make_polygrid(sphere, spacing, {});
   ENSURE(grid.has_value());
-  return two_point_error(*grid, team);
+  return two_point_error(*grid, {}, 0, team);
 }
 
 double elements_error(const render::TetMesh& sphere, ThreadTeam& team) {

@@ -92,14 +92,16 @@ void TwoPoint<T, Graph>::load(std::span<const std::array<float, 3>> q,
 
 template <class T, class Graph>
 SurfaceLight TwoPoint<T, Graph>::surface_light(std::span<const std::array<float, 3>> q,
-                                               const std::vector<Lanes<T>>& phi) const {
+                                               const std::vector<Lanes<T>>& phi,
+                                               std::span<const Lanes<T>> delta) const {
   ENSURE(q.size() == graph_.surface.size() && phi.size() == graph_.inner.size());
   SurfaceLight light{std::vector<std::array<float, 3>>(q.size()),
                      std::vector<std::array<float, 3>>(q.size())};
   for (std::size_t s = 0; s < q.size(); ++s) {
     for (int c = 0; c < 3; ++c) {
       const double source = boundary_.source_scale * q[s][c];
-      const double flux = conductances_[s][c] * (phi[graph_.surface[s].inner][c] - source);
+      const double off = delta.empty() ? 0.0 : delta[s][c];
+      const double flux = conductances_[s][c] * (phi[graph_.surface[s].inner][c] + off - source);
       light.net_flux[s][c] = static_cast<float>(flux);
       light.fluence[s][c] = static_cast<float>(source + 2.0 * boundary_.a * flux);
     }

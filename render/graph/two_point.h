@@ -37,8 +37,11 @@ class TwoPoint {
   const LaneMatrix<T>& matrix() const { return matrix_; }
   /// The right-hand side of light q, transmitted into the surface, W/mm^2.
   void load(std::span<const std::array<float, 3>> q, std::vector<Lanes<T>>& b) const;
+  /// `delta`, where it is not empty, is what the fluence at the foot of each surface node's link is more than the inner
+  /// node's (render/graph/leaning_links.h).
   SurfaceLight surface_light(std::span<const std::array<float, 3>> q,
-                             const std::vector<Lanes<T>>& phi) const;
+                             const std::vector<Lanes<T>>& phi,
+                             std::span<const Lanes<T>> delta = {}) const;
 
  private:
   const Graph& graph_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/graph/leaning_links.h"
 #include "render/graph/nearest.h"
 #include "render/graph/two_point.h"
 #include "render/scene/fresh_hierarchy.h"
@@ -26,12 +27,17 @@ class GraphSubsurface final : public Subsurface {
                   const DiffusionOptions& options)
       : Subsurface(std::move(mesh), options),
         graph_(std::move(graph)),
+        boundary_(boundary),
         diffusion_(graph_, boundary),
         phi_(graph_.inner.size(), Lanes<T>::zero()) {}
 
   Result<void> begin_with(const SignedDistance& solid,
                           const MaterialAt& material,
                           ThreadTeam& team) {
+    if constexpr (!kIsLattice) {
+      if (options_.corrections > 0)
+        lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, team);
+    }
     if (auto begun = begin(solid, material, team); !begun) return begun;
     solver_ = std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, team);
     if constexpr (kIsLattice) {
@@ -48,6 +54,7 @@ class GraphSubsurface final : public Subsurface {
     if constexpr (!kIsLattice) update_geometry(mesh_, graph_);
     auto taken = diffusion_.set_material(optics_);
     if (taken && solver_) solver_->matrix_changed();
+    if (taken && lean_) lean_->update(optics_);
     return taken;
   }
 
@@ -73,11 +80,18 @@ class GraphSubsurface final : public Subsurface {
         }
       });
     }
-    return solver_->solve(load_, phi_, solve_options(), stop);
+    const auto solve = [&](const std::vector<Lanes<T>>& load, double tolerance) {
+      auto options = solve_options();
+      options.tolerance = tolerance;
+      return solver_->solve(load, phi_, options, stop);
+    };
+    return lean_ ? lean_->settle(q, load_, phi_, options_.tolerance, options_.corrections, solve)
+                 : solve(load_, options_.tolerance);
   }
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
-    const SurfaceLight light = diffusion_.surface_light(q, phi_);
+    const SurfaceLight light = lean_ ? diffusion_.surface_light(q, phi_, lean_->at_surface())
+                                     : diffusion_.surface_light(q, phi_);
     if constexpr (kIsLattice) {
       return {interpolated(light.fluence), interpolated(light.net_flux)};
     } else {
@@ -101,8 +115,10 @@ class GraphSubsurface final : public Subsurface {
   }
 
   Graph graph_;
+  Boundary boundary_;
   TwoPoint<T, Graph> diffusion_;
   std::unique_ptr<FreshHierarchy<T>> solver_;
+  std::unique_ptr<LeaningLinks<T>> lean_;  // none: as two points have it
   std::vector<Lanes<T>> load_;
   std::vector<Lanes<T>> phi_;
   Interpolation<float> to_vertices_;

@@ -29,6 +29,8 @@ struct ShapeOptions {
   std::array<double, 3> rotation_degrees{};  ///< about x, y, z
 };
 
+/// How a material's block lies in a shape: the shape is cut from it, or it is laid around the shape.
+enum class Placement : std::uint8_t { kSolid, kShell };
 enum class Tiling : std::uint8_t { kClamp, kRepeat, kMirror };
 
 /// A second set of coefficients in a solid pattern, mixed logarithmically with weight w: c = c_0^(1-w) c_1^w.
@@ -46,9 +48,11 @@ struct PatternOptions {
 
 /// What a translucent object is made of.
 struct TranslucentOptions {
-  std::filesystem::path file;  ///< a material.vdb, placed solidly; empty: homogeneous, or a pattern
-  Vec3 origin;                 ///< where the file's block begins, in the shape's own frame, mm
-  double scale = 1.0;          ///< of the block's lengths; coefficients stay per mm
+  std::filesystem::path file;  ///< a material.vdb; empty: homogeneous, or a pattern
+  Placement placement = Placement::kSolid;
+  double shell_depth_mm = 0.0;      ///< how deep the block reaches as a shell; 0: as thick as it is
+  Vec3 origin;                      ///< where the file's block begins, in the shape's own frame, mm
+  double scale = 1.0;               ///< of the block's lengths; coefficients stay per mm
   Tiling tiling = Tiling::kMirror;  ///< beyond the block
   Colour absorption{0.01, 0.01, 0.01};
   Colour reduced_scattering{1.0, 1.0, 1.0};
@@ -135,6 +139,7 @@ struct DiffusionOptions {
   double spacing_mm = 0.0;           ///< this edge of the lattice; 0: from `tetrahedra`
   double interior_growth = 0.1;      ///< the papers' K
   double tolerance = 1e-4;           ///< relative residual
+  int corrections = 8;  ///< of a graph's links that lean, at most so many a solution; 0: none
   int max_iterations = 300;
   reconstruct::diffusion::BoundaryModel boundary =
       reconstruct::diffusion::BoundaryModel::kTwoMoment;
