@@ -2,46 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cstring>
 #include <optional>
 
 #include "gpu/commands.h"
-#include "render/raster/resolve_pass.h"
+#include "render/raster/picture_tile.h"
 #include "render/scene_buffer.h"
 #include "render_shaders.h"
 
 namespace opaline::render {
 namespace {
 
-constexpr int kTileSamples =
-    1024;  // along each side: 16 MiB of samples, whatever the picture's size
-
 struct TilePush {
   std::array<std::int32_t, 2> origin;
   std::array<std::int32_t, 2> size;
 };
-
-/// What one tile is drawn and averaged in.
-struct TileBuffers {
-  gpu::RenderTarget target;
-  gpu::Buffer samples;
-  gpu::Buffer pixels;
-  int width;  ///< pixels
-  int height;
-};
-
-Result<TileBuffers> make_tile(gpu::Context& context, int width, int height, int samples_per_axis) {
-  auto target =
-      gpu::RenderTarget::create(context, width * samples_per_axis, height * samples_per_axis);
-  if (!target) return target.error();
-  auto samples = gpu::Buffer::create(context, target->color_bytes(), gpu::Memory::kDevice);
-  if (!samples) return samples.error();
-  const std::uint64_t bytes = std::uint64_t{16} * width * height;
-  auto pixels = gpu::Buffer::create(context, bytes, gpu::Memory::kHost);
-  if (!pixels) return pixels.error();
-  return TileBuffers{*std::move(target), *std::move(samples), *std::move(pixels), width, height};
-}
 
 template <class T>
 Result<gpu::Buffer> buffer_of(gpu::Context& context, std::span<const T> values) {
@@ -49,16 +23,6 @@ Result<gpu::Buffer> buffer_of(gpu::Context& context, std::span<const T> values) 
   if (!buffer) return buffer;
   if (auto sent = gpu::upload(context, std::as_bytes(values), *buffer); !sent) return sent.error();
   return buffer;
-}
-
-/// Copies what of a tile lies within the picture.
-void place(TileBuffers& tile, int x0, int y0, Image<float>& picture) {
-  const int width = std::min(tile.width, picture.width() - x0);
-  const int height = std::min(tile.height, picture.height() - y0);
-  const std::span<float> pixels = tile.pixels.floats();
-  for (int y = 0; y < height; ++y)
-    std::copy_n(
-        pixels.begin() + std::ptrdiff_t{4} * y * tile.width, 4 * width, &picture.at(x0, y0 + y));
 }
 
 }  // namespace
@@ -69,39 +33,20 @@ struct Renderer::State {
   gpu::Pipeline draw;
   gpu::Pipeline resolve;
   gpu::Commands commands;
-  std::optional<TileBuffers> tile;
+  std::optional<PictureTile> tile;
 
-  Result<void> prepare_tile(const CameraModel& camera);
   Result<void> draw_tile(
       const gpu::Buffer& scene, const gpu::Buffer& field, int faces, int x0, int y0);
 };
-
-Result<void> Renderer::State::prepare_tile(const CameraModel& camera) {
-  const int side = kTileSamples / options.samples_per_axis;
-  const int width = std::min(side, camera.width);
-  const int height = std::min(side, camera.height);
-  if (tile && tile->width == width && tile->height == height) return ok();
-  tile.reset();
-  auto made = make_tile(*context, width, height, options.samples_per_axis);
-  if (!made) return made.error();
-  tile = *std::move(made);
-  return ok();
-}
 
 Result<void> Renderer::State::draw_tile(
     const gpu::Buffer& scene, const gpu::Buffer& field, int faces, int x0, int y0) {
   const int s = options.samples_per_axis;
   const TilePush where{{x0 * s, y0 * s}, {tile->width * s, tile->height * s}};
-  const ResolveShape shape{static_cast<std::uint32_t>(tile->width),
-                           static_cast<std::uint32_t>(tile->height),
-                           static_cast<std::uint32_t>(s)};
   const std::uint32_t vertices = 6U * kSegments * kSegments * faces;
   if (auto begun = commands.begin(); !begun) return begun;
   commands.draw(draw, {{{&scene, &field}}, gpu::push_of(where)}, vertices, tile->target);
-  commands.copy_color(tile->target, tile->samples);
-  commands.barrier();
-  record_resolve(resolve, tile->samples, tile->pixels, shape, commands);
-  commands.barrier();
+  tile->record_average(resolve, commands);
   if (auto ended = commands.end(); !ended) return ended;
   return context->run(commands);
 }
@@ -144,14 +89,19 @@ Result<Image<float>> Renderer::draw(const SurfaceField& field,
   const std::vector<float> packed = pack_field(field);
   const auto gpu_field = buffer_of(*state_->context, std::span<const float>(packed));
   if (!gpu_field) return gpu_field.error().in("the light field on the sample's surface");
-  if (auto made = state_->prepare_tile(camera); !made) return made.error();
+  auto made = prepare_tile(*state_->context,
+                           camera.width,
+                           camera.height,
+                           state_->options.samples_per_axis,
+                           state_->tile);
+  if (!made) return made.error();
   Image<float> picture(camera.width, camera.height, 4);
   for (int y = 0; y < camera.height; y += state_->tile->height)
     for (int x = 0; x < camera.width; x += state_->tile->width) {
       if (stop.stop_requested()) return cancelled("drawing was stopped");
       auto drawn = state_->draw_tile(*gpu_scene, *gpu_field, scene->visible[3], x, y);
       if (!drawn) return drawn.error().in("drawing");
-      place(*state_->tile, x, y, picture);
+      state_->tile->copy_to(x, y, picture);
     }
   return picture;
 }

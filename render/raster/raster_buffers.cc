@@ -13,6 +13,7 @@ constexpr double kMargin = 1.01;   // around the scene in a shadow map
 constexpr double kWidest = 80.0;   // degrees from a shadow map's middle to its side
 constexpr double kNearest = 1e-3;  // of the scene's radius, in front of a light
 constexpr double kRadians = std::numbers::pi / 180.0;
+constexpr double kCrease = 0.707;  // cosine between facet and vertex normal, as in surfaces.cc
 
 Vec4f vec4(Vec3 v, double w) {
   return {static_cast<float>(v.x),
@@ -22,8 +23,6 @@ Vec4f vec4(Vec3 v, double w) {
 }
 
 Vec4f vec4(const Colour& c, double w) { return vec4(Vec3{c[0], c[1], c[2]}, w); }
-
-Vec4f vec4(const std::array<float, 3>& c) { return {c[0], c[1], c[2], 0.0F}; }
 
 /// The row that gives scale (axis . (p - from)) + offset.
 Vec4f row(Vec3 axis, Vec3 from, double scale, double offset) {
@@ -90,30 +89,52 @@ Colour strength_of(const LightOptions& light) {
   return intensity;
 }
 
-void add_object(const SceneRenderer::DrawnObject& object, RasterGeometry& geometry) {
-  const Look& look = *object.look;
-  const auto first = static_cast<std::int32_t>(geometry.vertices.size());
-  const auto number = static_cast<std::int32_t>(geometry.objects.size());
-  const TriangleMesh& mesh = object.surface->mesh();
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    RasterVertex vertex{};
-    vertex.place = vec4(mesh.vertices[v], look.sky.empty() ? 1.0 : look.sky[v]);
-    vertex.normal = vec4(object.surface->normals()[v], look.marks.empty() ? 0.0 : look.marks[v]);
-    if (look.translucent && !look.light.fluence.empty()) {
-      vertex.fluence = vec4(look.light.fluence[v]);
-      vertex.flux = vec4(look.light.net_flux[v]);
-    }
-    geometry.vertices.push_back(vertex);
-  }
-  for (const auto& [a, b, c] : mesh.triangles) {
-    geometry.triangles.push_back({first + a, first + b, first + c, number});
-  }
-  geometry.objects.push_back({{look.translucent ? 1.0F : 0.0F,
-                               static_cast<float>(look.ior),
-                               static_cast<float>(look.surface.specular),
-                               static_cast<float>(look.surface.roughness)},
-                              vec4(look.reflectance, look.mark_radiance)});
+bool is_closed(const SceneRenderer::DrawnObject& object) {
+  return object.look->translucent && object.look->marks.empty();
 }
+
+/// One object's vertices and triangles.
+class RasterMesh {
+ public:
+  RasterMesh(const SceneRenderer::DrawnObject& object, int number, RasterGeometry& geometry)
+      : mesh_(object.surface->mesh()),
+        normals_(object.surface->normals()),
+        sky_(object.look->sky),
+        number_(number),
+        geometry_(geometry) {}
+
+  void add() {
+    const auto first = static_cast<std::uint32_t>(geometry_.vertices.size());
+    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
+      add_vertex(static_cast<int>(v), normals_[v]);
+    }
+    for (const auto& t : mesh_.triangles) {
+      const Vec3 a = mesh_.vertices[t[0]];
+      const Vec3 facet = normalized(cross(mesh_.vertices[t[1]] - a, mesh_.vertices[t[2]] - a));
+      const bool creased =
+          std::ranges::any_of(t, [&](int v) { return !(dot(normals_[v], facet) > kCrease); });
+      for (const int v : t) {
+        geometry_.corners.push_back(creased ? add_vertex(v, facet)
+                                            : first + static_cast<std::uint32_t>(v));
+      }
+    }
+  }
+
+ private:
+  std::uint32_t add_vertex(int v, Vec3 normal) {
+    const auto added = static_cast<std::uint32_t>(geometry_.vertices.size());
+    geometry_.vertices.push_back(
+        {vec4(mesh_.vertices[v], number_), vec4(normal, sky_.empty() ? 1.0 : sky_[v])});
+    geometry_.sources.push_back({number_, v});
+    return added;
+  }
+
+  const TriangleMesh& mesh_;
+  const std::vector<Vec3>& normals_;
+  const std::vector<float>& sky_;
+  int number_;
+  RasterGeometry& geometry_;
+};
 
 RasterGeometry::Ball ball_around(const std::vector<Vec3>& places) {
   if (places.empty()) return {};
@@ -126,10 +147,17 @@ RasterGeometry::Ball ball_around(const std::vector<Vec3>& places) {
 
 RasterGeometry raster_geometry(const std::vector<SceneRenderer::DrawnObject>& objects) {
   RasterGeometry geometry;
+  for (const bool closed : {true, false}) {
+    for (std::size_t o = 0; o < objects.size(); ++o) {
+      if (is_closed(objects[o]) == closed) {
+        RasterMesh(objects[o], static_cast<int>(o), geometry).add();
+      }
+    }
+    if (closed) geometry.closed_corners = static_cast<std::uint32_t>(geometry.corners.size());
+  }
   std::vector<Vec3> all;
   std::vector<Vec3> casters;
   for (const auto& object : objects) {
-    add_object(object, geometry);
     const auto& places = object.surface->mesh().vertices;
     all.insert(all.end(), places.begin(), places.end());
     if (!object.is_plane) casters.insert(casters.end(), places.begin(), places.end());
@@ -139,11 +167,43 @@ RasterGeometry raster_geometry(const std::vector<SceneRenderer::DrawnObject>& ob
   return geometry;
 }
 
+std::vector<RasterObject> raster_objects(const std::vector<SceneRenderer::DrawnObject>& objects) {
+  std::vector<RasterObject> made;
+  for (const auto& object : objects) {
+    const Look& look = *object.look;
+    made.push_back({{look.translucent ? 1.0F : 0.0F,
+                     static_cast<float>(look.ior),
+                     static_cast<float>(look.surface.specular),
+                     static_cast<float>(look.surface.roughness)},
+                    vec4(look.reflectance, look.mark_radiance)});
+  }
+  return made;
+}
+
+std::vector<RasterGlow> raster_glow(const std::vector<SceneRenderer::DrawnObject>& objects,
+                                    const RasterGeometry& geometry) {
+  std::vector<RasterGlow> glow(geometry.vertices.size());
+  for (std::size_t i = 0; i < glow.size(); ++i) {
+    const auto& [object, v] = geometry.sources[i];
+    const Look& look = *objects[object].look;
+    if (!look.marks.empty()) glow[i].mark = look.marks[v];
+    if (!look.translucent || look.light.fluence.empty()) continue;
+    glow[i].fluence = look.light.fluence[v];
+    glow[i].flux = look.light.net_flux[v];
+  }
+  return glow;
+}
+
 RasterLights raster_lights(const std::vector<LightOptions>& lights,
                            const RasterGeometry& geometry,
                            int texels) {
   RasterLights all;
   for (const LightOptions& light : lights) {
+    if (all.lights.size() == kMostLights) {
+      all.left_out.push_back(
+          fmt::format("{}: the first {} lights are drawn", light.name, kMostLights));
+      continue;
+    }
     RasterLight made{};
     made.along = vec4(length(light.direction) > 0.0 ? normalized(light.direction) : Vec3{},
                       static_cast<double>(light.kind));

@@ -29,16 +29,28 @@ struct RasterObject {
 struct RasterVertex {
   Vec4f place;
   Vec4f normal;
-  Vec4f fluence;
-  Vec4f flux;
+};
+struct RasterGlow {
+  std::array<float, 3> fluence;
+  std::array<float, 3> flux;
+  float mark;
+  float unused;
 };
 
 inline constexpr int kShadowMaps = 4;
+inline constexpr int kMostLights = 96;  ///< what a uniform buffer of 16384 bytes holds
 
+/// What stays while only light and lamps change. Triangles more than 45 degrees off a vertex's normal are flat, as in
+/// Surfaces: they have corners of their own.
 struct RasterGeometry {
+  struct Source {
+    int object = 0;
+    int vertex = 0;
+  };
   std::vector<RasterVertex> vertices;
-  std::vector<std::array<std::int32_t, 4>> triangles;  ///< corners and object
-  std::vector<RasterObject> objects;
+  std::vector<Source> sources;         ///< of each vertex
+  std::vector<std::uint32_t> corners;  ///< of triangles; first those seen from one side only
+  std::uint32_t closed_corners = 0;    ///< of translucent objects that are nowhere inside out
   struct Ball {
     Vec3 centre;
     double radius = 0.0;
@@ -48,7 +60,13 @@ struct RasterGeometry {
 };
 RasterGeometry raster_geometry(const std::vector<SceneRenderer::DrawnObject>& objects);
 
-/// The scene's lights. A shadow map covers the casters; those with a shadow map come with the view it is drawn with, at most kShadowMaps. A point light has one
+std::vector<RasterObject> raster_objects(const std::vector<SceneRenderer::DrawnObject>& objects);
+
+/// The light on each vertex, as it is now.
+std::vector<RasterGlow> raster_glow(const std::vector<SceneRenderer::DrawnObject>& objects,
+                                    const RasterGeometry& geometry);
+
+/// The scene's lights, at most kMostLights. A shadow map covers the casters; those with a shadow map come with the view it is drawn with, at most kShadowMaps. A point light has one
 /// where the whole scene fits into its view, a spot where its cone does; `left_out` says which have none.
 struct RasterLights {
   std::vector<RasterLight> lights;

@@ -11,8 +11,12 @@ struct Object {
   vec4 reflectance;  // of an opaque one; w: radiance of marks
 };
 struct Vertex {
-  vec4 place;    // w: the share of the sky it sees
-  vec4 normal;   // w: mark
-  vec4 fluence;  // phi, W/mm^2
-  vec4 flux;     // J_n, W/mm^2
+  vec4 place;   // w: its object
+  vec4 normal;  // w: the share of the sky it sees
+};
+struct Glow {
+  float fluence[3];  // phi, W/mm^2
+  float flux[3];     // J_n, W/mm^2
+  float mark;
+  float unused;
 };

@@ -6,29 +6,29 @@
 // Where painter.cc sends rays, lights are looked up in shadow maps, and what hides the mirrored environment is the share of
 // the sky that the place sees.   set 0: as surface.vert
 #include "raster.glsl"
-layout(std430, set = 0, binding = 0) readonly buffer Scene {
+layout(std140, set = 0, binding = 0) uniform Scene {
   vec4 eye;          // w: how many lights
   vec4 environment;  // radiance
-  Light lights[];
+  Light lights[96];  // kMostLights
 };
-layout(std430, set = 0, binding = 1) readonly buffer Objects { Object objects[]; };
-layout(std430, set = 0, binding = 4) readonly buffer Map0 { vec4 map0[]; };
-layout(std430, set = 0, binding = 5) readonly buffer Map1 { vec4 map1[]; };
-layout(std430, set = 0, binding = 6) readonly buffer Map2 { vec4 map2[]; };
-layout(std430, set = 0, binding = 7) readonly buffer Map3 { vec4 map3[]; };
+layout(std430, set = 0, binding = 4) readonly buffer Map0 { float map0[]; };
+layout(std430, set = 0, binding = 5) readonly buffer Map1 { float map1[]; };
+layout(std430, set = 0, binding = 6) readonly buffer Map2 { float map2[]; };
+layout(std430, set = 0, binding = 7) readonly buffer Map3 { float map3[]; };
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 fluence;
 layout(location = 3) in vec3 flux;
 layout(location = 4) in vec2 sky_mark;
-layout(location = 5) flat in vec3 facet;
-layout(location = 6) flat in int object;
+layout(location = 5) flat in vec4 optics;
+layout(location = 6) flat in vec4 reflectance;
 layout(location = 0) out vec4 radiance;
 
 const float kPi = 3.14159265358979;
 const float kGrazing = 0.02;
 const float kTexelsOff = 1.5;   // a place is looked up so far above its surface: about what a texel spans
 const float kDepthOff = 2e-5;   // and so much nearer to the light: rounding of 24 bits of depth
+const float kUnseen = 1e-4;     // of what a place shows: less light than that is left out
 
 float fresnel(float cosine, float ior) {
   const float square = 1.0 - (1.0 - cosine * cosine) / (ior * ior);
@@ -39,21 +39,21 @@ float fresnel(float cosine, float ior) {
 }
 
 float depth_at(int map, int texel) {
-  if (map == 0) return map0[texel].x;
-  if (map == 1) return map1[texel].x;
-  if (map == 2) return map2[texel].x;
-  return map3[texel].x;
+  if (map == 0) return map0[texel];
+  if (map == 1) return map1[texel];
+  if (map == 2) return map2[texel];
+  return map3[texel];
 }
 
 // The share of a light that comes through: of the four texels around a place, bilinear.
-float lit(Light light, vec3 n, float distance) {
-  const int map = int(light.position.w);
+float lit(int k, vec3 n, float distance) {
+  const int map = int(lights[k].position.w);
   if (map < 0) return 1.0;
-  const float texel = light.cone.z * (light.along.w == 0.0 ? 1.0 : distance);
+  const float texel = lights[k].cone.z * (lights[k].along.w == 0.0 ? 1.0 : distance);
   const vec4 p = vec4(place + n * (kTexelsOff * texel), 1.0);
-  const float w = dot(light.map[3], p);
-  const vec3 at = vec3(dot(light.map[0], p), dot(light.map[1], p), dot(light.map[2], p)) / w;
-  const int side = int(light.cone.w);
+  const float w = dot(lights[k].map[3], p);
+  const vec3 at = vec3(dot(lights[k].map[0], p), dot(lights[k].map[1], p), dot(lights[k].map[2], p)) / w;
+  const int side = int(lights[k].cone.w);
   const vec2 where = (at.xy * 0.5 + 0.5) * side - 0.5;
   const ivec2 low = ivec2(floor(where));
   const vec2 share = where - low;
@@ -69,24 +69,24 @@ float lit(Light light, vec3 n, float distance) {
 }
 
 // Irradiance on a surface across the light; `towards` it.
-vec3 sample_light(Light light, out vec3 towards, out float distance) {
+vec3 sample_light(int k, out vec3 towards, out float distance) {
   distance = 1e30;
-  towards = -light.along.xyz;
-  if (light.along.w == 0.0) return light.strength.rgb;
-  const vec3 way = light.position.xyz - place;
+  towards = -lights[k].along.xyz;
+  if (lights[k].along.w == 0.0) return lights[k].strength.rgb;
+  const vec3 way = lights[k].position.xyz - place;
   distance = length(way);
   towards = way / distance;
   float share = 1.0;
-  if (light.along.w == 2.0) {
-    const float angle = acos(clamp(-dot(light.along.xyz, towards), -1.0, 1.0));
-    const float t = clamp((light.cone.x - angle) / max(light.cone.y, 1e-6), 0.0, 1.0);
+  if (lights[k].along.w == 2.0) {
+    const float angle = acos(clamp(-dot(lights[k].along.xyz, towards), -1.0, 1.0));
+    const float t = clamp((lights[k].cone.x - angle) / max(lights[k].cone.y, 1e-6), 0.0, 1.0);
     share = t * t * (3.0 - 2.0 * t);
   }
-  if (light.along.w == 3.0) share = max(0.0, -dot(light.along.xyz, towards));
-  return light.strength.rgb * (share / (distance * distance));
+  if (lights[k].along.w == 3.0) share = max(0.0, -dot(lights[k].along.xyz, towards));
+  return lights[k].strength.rgb * (share / (distance * distance));
 }
 
-float mirrored_share(vec4 optics, vec3 n, vec3 l, vec3 v) {
+float mirrored_share(vec3 n, vec3 l, vec3 v) {
   const float nl = dot(n, l);
   const float nv = dot(n, v);
   if (optics.z == 0.0 || optics.y == 1.0 || nl <= 0.0 || nv <= 0.0) return 0.0;
@@ -103,8 +103,6 @@ float mirrored_share(vec4 optics, vec3 n, vec3 l, vec3 v) {
 }
 
 void main() {
-  const vec4 optics = objects[object].optics;
-  const vec4 reflectance = objects[object].reflectance;
   const bool translucent = optics.x > 0.0;
   if (sky_mark.y > 0.5) {
     radiance = vec4(reflectance.w, 0.0, reflectance.w, 1.0);
@@ -112,7 +110,7 @@ void main() {
   }
   const vec3 v = normalize(eye.xyz - place);
   vec3 n = normalize(normal);
-  if (!translucent && dot(facet, v) < 0.0) n = -n;
+  if (!translucent && !gl_FrontFacing) n = -n;
   const float off = dot(n, v);
   if (off < kGrazing) n = normalize(n + v * (kGrazing - off));
   const float cosine = min(1.0, dot(n, v));
@@ -127,13 +125,13 @@ void main() {
   for (int k = 0; k < int(eye.w); ++k) {
     vec3 l;
     float distance;
-    const vec3 e = sample_light(lights[k], l, distance);
+    const vec3 e = sample_light(k, l, distance);
     const float nl = dot(n, l);
     if (nl <= 0.0 || max(e.r, max(e.g, e.b)) <= 0.0) continue;
-    const float mirrored = mirrored_share(optics, n, l, v);
-    if (translucent && mirrored == 0.0) continue;
     const vec3 matte = translucent ? vec3(0.0) : reflectance.rgb / kPi;
-    sum += (matte + mirrored) * e * (nl * lit(lights[k], n, distance));
+    const vec3 more = (matte + mirrored_share(n, l, v)) * e * nl;
+    if (all(lessThanEqual(more, kUnseen * sum))) continue;
+    sum += more * lit(k, n, distance);
   }
   if (optics.z != 0.0 && ior != 1.0) sum += environment.rgb * (fresnel(cosine, ior) * sky_mark.x);
   radiance = vec4(sum, 1.0);

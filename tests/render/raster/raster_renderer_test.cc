@@ -122,6 +122,19 @@ TEST_F(Raster, ShowsSpotsAndPointLightsAsRaysDo) {
   EXPECT_LT(share_that_differs(by_raster(), by_host()), 0.015);
 }
 
+// From below the floor hides half of the ring and shows its back, which is as bright as its front.
+TEST_F(Raster, ShowsTheBackOfAFloorAsRaysDo) {
+  Scene scene = ring_on_floor();
+  scene.camera.position.z = -40.0;
+  scene.lights[0].direction = {-0.5, -1.0, 0.9};
+  make(scene);
+  EXPECT_LT(share_that_differs(by_raster(), by_host()), 0.01);
+  scene.lights[0].direction.z *= 1.5;  // only light and lamps change: surfaces are not sent again
+  ASSERT_TRUE(host_->light(scene.lights, {}));
+  ASSERT_TRUE(raster_->take(*host_));
+  EXPECT_LT(share_that_differs(by_raster(), by_host()), 0.01);
+}
+
 TEST_F(Raster, ASceneWithoutAShadowDiffersWhereTheShadowWas) {
   Scene scene = ring_on_floor();
   scene.lights[0].shadows = false;
@@ -185,7 +198,7 @@ TEST_F(Raster, AbsentDeviceIsRefusedWithAReason) {
 TEST_F(Raster, ALostDeviceIsAnErrorAndAnotherOneGoesOn) {
   make(ring_on_floor());
   RasterOptions options;
-  options.gpu.rehearsal.lost_at_submission = 6;
+  options.gpu.rehearsal.lost_at_submission = 2;  // the first takes the scene
   auto fragile = RasterRenderer::create(options);
   ASSERT_TRUE(fragile);
   Result<void> taken = (*fragile)->take(*host_);
