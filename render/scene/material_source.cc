@@ -34,36 +34,7 @@ Result<void> check_scatters(const Material& material) {
   return ok();
 }
 
-/// The two cells around a coordinate in cells, and the share of the second.
-struct Span {
-  int low = 0;
-  int high = 0;
-  double share = 0.0;
-};
-
-Span span_at(double coordinate, int cells, Tiling tiling) {
-  const double place = tiled(coordinate, cells, tiling);
-  const int low = static_cast<int>(std::floor(place));
-  const double share = place - low;
-  if (tiling == Tiling::kRepeat) return {(low + cells) % cells, (low + 1 + cells) % cells, share};
-  return {std::clamp(low, 0, cells - 1), std::clamp(low + 1, 0, cells - 1), share};
-}
-
 }  // namespace
-
-double tiled(double coordinate, int cells, Tiling tiling) {
-  switch (tiling) {
-    case Tiling::kClamp:
-      return std::clamp(coordinate, 0.0, cells - 1.0);
-    case Tiling::kRepeat:
-      return coordinate - cells * std::floor((coordinate + 0.5) / cells);
-    case Tiling::kMirror:
-      break;
-  }
-  const double turn =
-      coordinate + 0.5 - 2.0 * cells * std::floor((coordinate + 0.5) / (2.0 * cells));
-  return (turn < cells ? turn : 2.0 * cells - turn) - 0.5;
-}
 
 Result<MaterialSource> MaterialSource::create(const TranslucentOptions& options,
                                               const Pose& scene_from_shape) {
@@ -84,6 +55,22 @@ void MaterialSource::take_block(std::shared_ptr<Material> block, Vec3 origin) {
   options_.origin = origin;
   options_.scale = 1.0;
   options_.tiling = Tiling::kClamp;
+  shell_.reset();
+}
+
+Result<void> MaterialSource::wrap(const SignedDistance& solid, std::stop_token stop) {
+  if (!block_ || options_.placement != Placement::kShell) return ok();
+  auto shell = ShellMaterial::create(block_,
+                                     {.depth_mm = options_.shell_depth_mm,
+                                      .scale = options_.scale,
+                                      .origin = options_.origin,
+                                      .tiling = options_.tiling},
+                                     solid,
+                                     shape_from_scene_.inverse(),
+                                     std::move(stop));
+  if (!shell) return shell.error();
+  shell_ = *std::move(shell);
+  return ok();
 }
 
 bool MaterialSource::is_homogeneous() const {
@@ -104,6 +91,10 @@ double MaterialSource::pattern_weight(Vec3 place) const {
 }
 
 Optics MaterialSource::at(Vec3 place_in_scene) const {
+  if (shell_) {
+    const Coefficients found = shell_->at(place_in_scene);
+    return optics_of(found.absorption, found.reduced_scattering);
+  }
   const Vec3 place = shape_from_scene_.apply(place_in_scene);
   if (block_) return in_block(place);
   if (is_homogeneous()) return optics_of(options_.absorption, options_.reduced_scattering);
@@ -118,28 +109,10 @@ Optics MaterialSource::at(Vec3 place_in_scene) const {
 }
 
 Optics MaterialSource::in_block(Vec3 place) const {
-  const Block& block = block_->block;
+  const Tiling tiling = options_.tiling;
   const Vec3 p = (place - options_.origin) * (1.0 / options_.scale);
-  const std::array spans{span_at(p.x / block.hx - 0.5, block.nx, options_.tiling),
-                         span_at(p.y / block.hy - 0.5, block.ny, options_.tiling),
-                         span_at(p.z / block.hz - 0.5, block.nz, options_.tiling)};
-  Colour absorption{};
-  Colour scattering{};
-  for (int corner = 0; corner < 8; ++corner) {
-    std::array<int, 3> cell{};
-    double weight = 1.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const bool second = (corner >> axis & 1) != 0;
-      cell[axis] = second ? spans[axis].high : spans[axis].low;
-      weight *= second ? spans[axis].share : 1.0 - spans[axis].share;
-    }
-    const std::size_t index = block.index(cell[0], cell[1], cell[2]);
-    for (int c = 0; c < 3; ++c) {
-      absorption[c] += weight * block_->channels[c].absorption[index];
-      scattering[c] += weight * block_->channels[c].reduced_scattering[index];
-    }
-  }
-  return optics_of(absorption, scattering);
+  const Coefficients found = looked_up(*block_, p, {tiling, tiling, tiling});
+  return optics_of(found.absorption, found.reduced_scattering);
 }
 
 }  // namespace opaline::render

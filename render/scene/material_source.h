@@ -1,14 +1,18 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <stop_token>
 
 #include "base/material.h"
 #include "render/graph/optics.h"
 #include "render/scene/scene.h"
+#include "render/scene/shell_material.h"
 
 namespace opaline::render {
 
-/// The coefficients of a translucent object by place, as if it were cut from a block of the material (solid placement):
+/// The coefficients of a translucent object by place, as if it were cut from a block of the material (solid placement), or with
+/// a block laid around it (wrap(), render/scene/shell_material.h):
 ///
 ///   from a file   trilinear between the centres of the block's cells, which begins at `origin` in the shape's frame and is
 ///                 `scale` times as large; beyond it the block is clamped, repeated or mirrored
@@ -23,12 +27,18 @@ class MaterialSource {
   static Result<MaterialSource> create(const TranslucentOptions& options,
                                        const Pose& scene_from_shape);
 
+  /// Lays the block around a solid, where the options place it as a shell. The solid must outlive it. Errors: those of
+  /// ShellMaterial.
+  Result<void> wrap(const SignedDistance& solid, std::stop_token stop);
+
   Optics at(Vec3 place_in_scene) const;
   /// The file's block; none where there is no file.
   const std::shared_ptr<Material>& block() const { return block_; }
   /// From now on this block, its corner at `origin` in the shape's frame, clamped beyond it.
   void take_block(std::shared_ptr<Material> block, Vec3 origin);
   double ior() const { return ior_; }
+  /// None where the material is placed solidly.
+  const ShellMaterial* shell() const { return shell_ ? &*shell_ : nullptr; }
   /// Whether every place has the same coefficients.
   bool is_homogeneous() const;
 
@@ -42,9 +52,7 @@ class MaterialSource {
   Pose shape_from_scene_;
   double ior_;
   std::shared_ptr<Material> block_;  // none: options_'s own
+  std::optional<ShellMaterial> shell_;
 };
-
-/// Where a coordinate beyond 0 to n - 1 is looked up, by tiling: a place between cell centres again.
-double tiled(double coordinate, int cells, Tiling tiling);
 
 }  // namespace opaline::render

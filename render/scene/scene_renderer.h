@@ -81,6 +81,8 @@ class SceneRenderer {
     bool is_plane = false;
   };
   std::vector<DrawnObject> drawn() const;
+  /// Another number, of all scenes in this process, whenever the drawn surfaces or what they see of the sky have changed; never 0.
+  std::uint64_t shape() const { return shape_; }
   const std::vector<LightOptions>& lights() const { return lights_; }
   const EnvironmentOptions& environment() const { return scene_.environment; }
   /// For somebody else who draws the scene: what that leaves out, and how long it took.
@@ -100,9 +102,11 @@ class SceneRenderer {
   };
 
   SceneRenderer(const Scene& scene, ThreadTeam& team) : scene_(scene), team_(team) {}
-  Result<void> add(const ObjectOptions& object, std::stop_token stop);
-  Result<void> add_translucent(const ObjectOptions& object, std::stop_token stop);
-  Result<void> add_opaque(const ObjectOptions& object, std::stop_token stop);
+  Result<void> add(const ObjectOptions& object, const Saying& say, std::stop_token stop);
+  Result<void> add_translucent(const ObjectOptions& object,
+                               const Saying& say,
+                               std::stop_token stop);
+  Result<void> add_opaque(const ObjectOptions& object, const Saying& say, std::stop_token stop);
   void note_resolution(const ObjectOptions& object, const Subsurface::Report& report);
   Result<void> look_at_sky(std::stop_token stop);
   struct Entering {
@@ -129,6 +133,7 @@ class SceneRenderer {
   Surfaces surfaces_;
   std::vector<Look> looks_;
   std::vector<bool> light_reaches_;  // by source
+  std::uint64_t shape_ = 0;
   SceneStatistics statistics_;
 };
 

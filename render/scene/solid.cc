@@ -19,8 +19,10 @@ constexpr int kPlaneCells = 128;
 
 double longest(Vec3 size) { return std::max({size.x, size.y, size.z}); }
 
-Result<TriangleMesh> read_surface(const std::filesystem::path& file) {
-  if (file.extension() != ".vdb" && file.extension() != ".VDB") return read_mesh(file);
+Result<TriangleMesh> read_surface(const std::filesystem::path& file, const std::stop_token& stop) {
+  if (file.extension() != ".vdb" && file.extension() != ".VDB") {
+    return read_mesh(file, 1.0, stop);
+  }
   auto surface = read_level_set(file);
   if (!surface) return surface.error();
   return TriangleMesh{std::move(surface->vertices), std::move(surface->triangles)};
@@ -41,7 +43,9 @@ Result<void> place(std::vector<Vec3>& vertices, const ShapeOptions& shape) {
 }
 
 /// The file's triangles, or the surface of its tetrahedra, which `tets` gets.
-Result<TriangleMesh> placed_surface(const ShapeOptions& shape, std::optional<TetMesh>& tets) {
+Result<TriangleMesh> placed_surface(const ShapeOptions& shape,
+                                    std::optional<TetMesh>& tets,
+                                    const std::stop_token& stop) {
   if (is_tet_file(shape.file)) {
     auto read = read_tets(shape.file);
     if (!read) return read.error();
@@ -49,14 +53,16 @@ Result<TriangleMesh> placed_surface(const ShapeOptions& shape, std::optional<Tet
     tets = *std::move(read);
     return surface_mesh(*tets);
   }
-  auto mesh = read_surface(shape.file);
+  auto mesh = read_surface(shape.file, stop);
   if (!mesh) return mesh.error();
   if (auto placed = place(mesh->vertices, shape); !placed) return placed.error();
   return mesh;
 }
 
-std::vector<std::string> notes_on(const TriangleMesh& mesh, const std::filesystem::path& file) {
-  const MeshTopology found = topology(weld(mesh));
+std::vector<std::string> notes_on(const TriangleMesh& mesh,
+                                  const std::filesystem::path& file,
+                                  const std::stop_token& stop) {
+  const MeshTopology found = topology(weld(mesh, stop), stop);
   std::vector<std::string> notes;
   const auto say = [&](const std::string& what) {
     notes.push_back(fmt::format("{}: {}", file.filename().string(), what));
@@ -98,7 +104,12 @@ PlacedSolid::PlacedSolid(std::unique_ptr<SignedDistance> solid, const Pose& scen
   bounds_ = opaline::render::bounds(corners);
 }
 
-Result<LoadedShape> load_shape(const ShapeOptions& shape) {
+Result<LoadedShape> load_shape(const ShapeOptions& shape,
+                               const std::stop_token& stop,
+                               const Saying& say) {
+  const auto now = [&](std::string_view what) {
+    if (say) say(fmt::format("{} {}", what, shape.file.filename().string()));
+  };
   LoadedShape loaded;
   if (!shape.name.empty()) {
     auto solid = make_shape(shape.name, shape.size_mm);
@@ -106,12 +117,16 @@ Result<LoadedShape> load_shape(const ShapeOptions& shape) {
     loaded.solid = std::make_unique<PlacedSolid>(*std::move(solid), scene_from_shape(shape));
     return loaded;
   }
-  auto surface = placed_surface(shape, loaded.tets);
+  now("reading");
+  auto surface = placed_surface(shape, loaded.tets, stop);
   if (!surface) return surface.error();
-  auto solid = MeshDistance::create(*surface);
+  now("the signed distance of");
+  auto solid = MeshDistance::create(*surface, stop);
   if (!solid) return solid.error().in(shape.file.string());
   loaded.solid = *std::move(solid);
-  loaded.notes = notes_on(*surface, shape.file);
+  now("looking for holes in");
+  loaded.notes = notes_on(*surface, shape.file, stop);
+  if (stop.stop_requested()) return cancelled("looking for holes");
   loaded.surface = *std::move(surface);
   return loaded;
 }
@@ -137,7 +152,8 @@ TriangleMesh plane_mesh(double size_mm, int cells) {
 
 Result<LoadedShape> load_opaque(const ShapeOptions& shape,
                                 double tetrahedra,
-                                std::stop_token stop) {
+                                std::stop_token stop,
+                                const Saying& say) {
   if (shape.name == "plane") {
     LoadedShape loaded;
     loaded.surface = plane_mesh(shape.size_mm, kPlaneCells);
@@ -145,7 +161,7 @@ Result<LoadedShape> load_opaque(const ShapeOptions& shape,
     for (Vec3& p : loaded.surface->vertices) p = pose.apply(p);
     return loaded;
   }
-  auto loaded = load_shape(shape);
+  auto loaded = load_shape(shape, stop, say);
   if (!loaded || loaded->surface) return loaded;
   const double spacing = spacing_for(estimate_volume(*loaded->solid), tetrahedra);
   const auto tets = stuff(*loaded->solid, {.spacing_mm = spacing, .interior_growth = 1.0}, stop);

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/mesh/signed_distance.h"
@@ -36,14 +38,22 @@ struct LoadedShape {
   std::vector<std::string> notes;  ///< what a user should know of the file: holes, turned triangles
 };
 
-/// Errors: those of read_mesh(), read_level_set() and make_shape(); kInvalidArgument for a file without extent.
-Result<LoadedShape> load_shape(const ShapeOptions& shape);
+/// Hears what is being done now, where it takes long: "reading stone.stl".
+using Saying = std::function<void(std::string_view)>;
+
+/// Errors: those of read_mesh(), read_level_set() and make_shape(); kInvalidArgument for a file without extent; kCancelled.
+Result<LoadedShape> load_shape(const ShapeOptions& shape,
+                               const std::stop_token& stop = {},
+                               const Saying& say = {});
 
 /// A square in the plane z = 0 of its own frame that faces +z, cut into cells x cells x 2 triangles.
 TriangleMesh plane_mesh(double size_mm, int cells);
 
 /// The triangles of an opaque object: the file's, or those that isosurface stuffing with about so many tetrahedra leaves
 /// of a shape by name; "plane" is plane_mesh(). `solid` is none for a plane.
-Result<LoadedShape> load_opaque(const ShapeOptions& shape, double tetrahedra, std::stop_token stop);
+Result<LoadedShape> load_opaque(const ShapeOptions& shape,
+                                double tetrahedra,
+                                std::stop_token stop,
+                                const Saying& say = {});
 
 }  // namespace opaline::render

@@ -8,7 +8,6 @@
 #include "base/io/volume_io.h"
 #include "render/edit/material_block.h"
 #include "render/graph/quad_graph.h"
-#include "render/scene/solid.h"
 
 namespace opaline::render {
 namespace {
@@ -27,10 +26,11 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
                                                                  const DiffusionOptions& diffusion,
                                                                  int refinement,
                                                                  ThreadTeam& team,
-                                                                 std::stop_token stop) {
+                                                                 std::stop_token stop,
+                                                                 const Saying& say) {
   auto body = std::unique_ptr<TranslucentBody>(new TranslucentBody);
   const auto start = std::chrono::steady_clock::now();
-  auto shape = load_shape(object.shape);
+  auto shape = load_shape(object.shape, stop, say);
   if (!shape) return shape.error();
   body->options_ = object.material;
   body->scene_from_own_ = scene_from_shape(object.shape);
@@ -38,9 +38,11 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
   if (!material) return material.error();
   body->material_ = *std::move(material);
   body->solid_ = std::move(shape->solid);
+  if (auto wrapped = body->material_->wrap(*body->solid_, stop); !wrapped) return wrapped.error();
   body->notes_ = std::move(shape->notes);
   body->load_seconds_ =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (say) say("cutting it into tetrahedra");
   const Subsurface::MaterialAt at = [&](Vec3 place) { return body->material_->at(place); };
   auto light = shape->tets
                    ? Subsurface::create(
@@ -84,7 +86,8 @@ Result<void> TranslucentBody::begin_editing() {
   std::shared_ptr<Material> block = material_->block();
   double scale = options_.scale;
   block_origin_ = options_.origin;
-  if (!block || !within(rest_box_, {block_origin_, block_origin_ + block->block.size() * scale})) {
+  if (!block || material_->shell() != nullptr ||
+      !within(rest_box_, {block_origin_, block_origin_ + block->block.size() * scale})) {
     const double cell = block
                             ? scale * std::min({block->block.hx, block->block.hy, block->block.hz})
                             : longest_side(rest_box_.size()) / options_.edit_cells;

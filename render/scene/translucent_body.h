@@ -10,6 +10,7 @@
 #include "render/edit/material_editor.h"
 #include "render/scene/drawn_surface.h"
 #include "render/scene/material_source.h"
+#include "render/scene/solid.h"
 #include "render/scene/subsurface.h"
 
 namespace opaline::render {
@@ -29,7 +30,8 @@ class TranslucentBody {
                                                          const DiffusionOptions& diffusion,
                                                          int refinement,
                                                          ThreadTeam& team,
-                                                         std::stop_token stop);
+                                                         std::stop_token stop,
+                                                         const Saying& say = {});
 
   Subsurface& subsurface() { return *subsurface_; }
   const Subsurface& subsurface() const { return *subsurface_; }

@@ -73,6 +73,18 @@ TEST(SceneConfig, ReadsWhatIsWritten) {
   EXPECT_EQ(scene->camera.position, (Vec3{40.0, 0.0, 0.0}));
 }
 
+TEST(SceneConfig, ReadsAShellOnlyWhereABlockIsWrappedAround) {
+  const std::string_view coefficients =
+      "absorption = [0.01, 0.01, 0.01]\nreduced_scattering = [1, 1, 1]";
+  const auto shell = parsed(scene_with(
+      coefficients, "file = \"wax.vdb\"\nplacement = \"shell\"\nshell_depth = \"3 mm\""));
+  ASSERT_TRUE(shell) << shell.error().message;
+  EXPECT_EQ(shell->objects[0].material.placement, render::Placement::kShell);
+  EXPECT_EQ(shell->objects[0].material.shell_depth_mm, 3.0);
+  EXPECT_THAT(refusal(coefficients, "file = \"wax.vdb\"\nshell_depth = \"3 mm\""),
+              HasSubstr("unknown key \"shell_depth\""));
+}
+
 TEST(SceneConfig, RefusesWhatItCannotMeanWithPlaceAndRemedy) {
   EXPECT_THAT(refusal("size =", "sise ="),
               AllOf(HasSubstr("scene.toml:10:1: unknown key \"sise\" in [objects 1]"),
