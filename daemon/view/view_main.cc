@@ -98,6 +98,11 @@ class Viewing {
            screenshot_.empty();
   }
 
+  bool is_last() const {
+    return shown_ + 1 >= arguments_.frames && next_ >= script_.size() && wait_ == 0 && !finished_ &&
+           !arguments_.screenshot.empty();
+  }
+
   /// One picture, and before it one thing of the script.
   Result<void> step(const std::stop_token& stop) {
     const auto start = std::chrono::steady_clock::now();
@@ -111,7 +116,7 @@ class Viewing {
     follow_mouse(*model_, desk_, size->width, size->height);
     draw_panels(*model_, desk_);
     if (auto drawn = draw(*size, stop); !drawn) return drawn;
-    const bool last = shown_ + 1 >= arguments_.frames && next_ >= script_.size() && wait_ == 0;
+    const bool last = is_last();
     if (last && !finished_ && !arguments_.screenshot.empty()) screenshot_ = arguments_.screenshot;
     finished_ = finished_ || last;
     auto shown = show();
@@ -123,10 +128,14 @@ class Viewing {
   Result<void> draw(ViewWindow::Size size, const std::stop_token& stop) {
     const int width = std::max(1, static_cast<int>(desk_.resolution * size.width));
     const int height = std::max(1, static_cast<int>(desk_.resolution * size.height));
+    if (auto caught = model_->catch_up(); !caught) desk_.message = caught.error().message;
+    const bool settled = !screenshot_.empty() || is_last();  // what is kept shows its own light
     changed_ = !picture_ || picture_->width() != width || picture_->height() != height ||
-               version_ != model_->version() || exposure_ != desk_.exposure;
+               version_ != model_->version() || exposure_ != desk_.exposure ||
+               (settled && model_->is_lighting());
     if (!changed_) return ok();
-    auto drawn = model_->picture(width, height, desk_.exposure, stop);
+    auto drawn = settled ? model_->picture(width, height, desk_.exposure, stop)
+                         : model_->picture_now(width, height, desk_.exposure, stop);
     if (!drawn) return drawn.error();
     picture_ = *std::move(drawn);
     version_ = model_->version();

@@ -126,7 +126,7 @@ void quality_panel(ViewModel& model, ViewDesk& desk) {
 }
 
 void statistics_panel(ViewModel& model, const ViewDesk& desk) {
-  const render::SceneStatistics& s = model.renderer().statistics();
+  const render::SceneStatistics& s = model.statistics();
   ImGui::TextWrapped("%s", model.device().c_str());
   ImGui::Text("frame %.0f ms; light %.0f, solve %.0f",
               1e3 * desk.frame_seconds,
@@ -144,6 +144,7 @@ void statistics_panel(ViewModel& model, const ViewDesk& desk) {
                        object.relative_residual,
                        object.triangles);
   }
+  if (model.is_lighting()) ImGui::TextUnformatted("finding the light ...");
   for (const auto& what : s.left_out) ImGui::TextWrapped("off: %s", what.c_str());
   for (const auto& what : model.left_out()) ImGui::TextWrapped("off: %s", what.c_str());
   for (const auto& note : s.notes) ImGui::TextWrapped("%s", note.c_str());

@@ -143,6 +143,7 @@ std::optional<ViewModel::Place> ViewModel::at(double x, double y, int width, int
 }
 
 Result<std::size_t> ViewModel::paint(double x, double y, int width, int height, EditOptions brush) {
+  hold();
   const auto place = at(x, y, width, height);
   TranslucentBody* const body = place ? renderer_->body(place->object) : nullptr;
   if (body == nullptr) return std::size_t{0};
@@ -157,6 +158,7 @@ Result<std::size_t> ViewModel::paint(double x, double y, int width, int height, 
 }
 
 Result<std::size_t> ViewModel::paint_all(std::size_t object, EditOptions brush) {
+  hold();
   TranslucentBody* const body = renderer_->body(object);
   if (body == nullptr) return std::size_t{0};
   brush.reach = EditOptions::Reach::kBall;
@@ -172,6 +174,7 @@ Result<std::size_t> ViewModel::paint_all(std::size_t object, EditOptions brush) 
 }
 
 Result<bool> ViewModel::undo() {
+  hold();
   while (!done_.empty()) {
     const std::size_t object = done_.back();
     done_.pop_back();
@@ -186,6 +189,7 @@ Result<bool> ViewModel::undo() {
 }
 
 Result<bool> ViewModel::redo() {
+  hold();
   if (undone_.empty()) return false;
   const std::size_t object = undone_.back();
   undone_.pop_back();
@@ -197,6 +201,7 @@ Result<bool> ViewModel::redo() {
 }
 
 Result<std::size_t> ViewModel::bend(std::size_t object, double amount) {
+  hold();
   if (object >= scene_.objects.size()) return std::size_t{0};
   DeformOptions deform = scene_.objects[object].deform;
   if (deform.kind == DeformOptions::Kind::kNone) return std::size_t{0};
@@ -214,15 +219,38 @@ void ViewModel::set_tolerance(double tolerance) {
   const double allowed = std::clamp(tolerance, 1e-5, 0.1);
   if (allowed == scene_.diffusion.tolerance) return;
   if (allowed < scene_.diffusion.tolerance) changed();
+  hold();
   scene_.diffusion.tolerance = allowed;
   renderer_->set_tolerance(allowed);
 }
 
+/// The scene is about to be touched.
+void ViewModel::hold() {
+  if (!background_.stop()) return;
+  dark_ = true;
+  ++version_;
+}
+
+void ViewModel::has_light() {
+  taken_ = false;
+  was_lit_ = true;
+  statistics_ = renderer_->statistics();
+  ++version_;
+}
+
 Result<void> ViewModel::light(std::stop_token stop) {
+  hold();
   if (!dark_) return ok();
   if (auto lit = renderer_->light(lights_, std::move(stop)); !lit) return lit;
   dark_ = false;
-  taken_ = false;
+  has_light();
+  return ok();
+}
+
+Result<void> ViewModel::catch_up() {
+  if (!background_.ready()) return ok();
+  if (auto lit = background_.take(); !lit) return lit;
+  has_light();
   return ok();
 }
 
@@ -244,24 +272,50 @@ Result<Image<std::uint8_t>> ViewModel::draw(int width,
                           {.background = scene_.picture.background, .gain = gain});
 }
 
+Result<void> ViewModel::lose_if_asked() {
+  if (!lose_next_) return ok();
+  lose_next_ = false;
+  const RasterOptions whole = options_;
+  options_.gpu.rehearsal.lost_at_submission = 1;
+  auto made = make_raster();
+  options_ = whole;
+  return made;
+}
+
+Result<Image<std::uint8_t>> ViewModel::draw_or_reopen(int width,
+                                                      int height,
+                                                      double stops,
+                                                      std::stop_token stop) {
+  if (auto lost = lose_if_asked(); !lost) return lost.error();
+  auto drawn = draw(width, height, stops, stop);
+  if (drawn || drawn.error().code != ErrorCode::kUnavailable) return drawn;
+  hold();
+  ++device_losses_;
+  if (auto made = make_raster(); !made) return made.error();
+  return draw(width, height, stops, stop);
+}
+
 Result<Image<std::uint8_t>> ViewModel::picture(int width,
                                                int height,
                                                double stops,
                                                std::stop_token stop) {
   if (auto lit = light(stop); !lit) return lit.error();
-  if (lose_next_) {
-    lose_next_ = false;
-    const RasterOptions whole = options_;
-    options_.gpu.rehearsal.lost_at_submission = 1;
-    const auto made = make_raster();
-    options_ = whole;
-    if (!made) return made.error();
+  return draw_or_reopen(width, height, stops, stop);
+}
+
+Result<Image<std::uint8_t>> ViewModel::picture_now(int width,
+                                                   int height,
+                                                   double stops,
+                                                   std::stop_token stop) {
+  if (!was_lit_) return picture(width, height, stops, std::move(stop));
+  if (auto caught = catch_up(); !caught) return caught.error();
+  if (lose_next_ || !raster_) hold();
+  auto drawn = draw_or_reopen(width, height, stops, std::move(stop));
+  if (drawn && dark_ && !background_.busy()) {
+    dark_ = false;
+    background_.start(*renderer_, lights_);
   }
-  auto drawn = draw(width, height, stops, stop);
-  if (drawn || drawn.error().code != ErrorCode::kUnavailable) return drawn;
-  ++device_losses_;
-  if (auto made = make_raster(); !made) return made.error();
-  return draw(width, height, stops, stop);
+  return drawn;
 }
 
 }  // namespace opaline::render

@@ -7,13 +7,15 @@
 
 #include "render/raster/raster_renderer.h"
 #include "render/scene/scene_renderer.h"
+#include "render/view/background_light.h"
 
 namespace opaline::render {
 
 /// What a viewer of a scene does, without a window: camera and lights that move, strokes and bends, and the picture as it is
 /// now. Whatever changed is lit again before the next picture, from the light there was.
 ///
-/// A lost device is replaced once a picture: device_losses() counts them.
+/// Light is found on a thread of its own while picture_now() shows the light before; everything else that touches the scene
+/// stops that first. A lost device is replaced once a picture: device_losses() counts them.
 ///
 /// Threads: one call at a time.
 class ViewModel {
@@ -58,8 +60,18 @@ class ViewModel {
   /// The dial between speed and accuracy: the relative residual of each picture's light, 1e-5 to 0.1.
   void set_tolerance(double tolerance);
 
-  /// The picture as a screen shows it. `stops` of exposure above the scene's own.
+  /// The picture as a screen shows it, its light found first. `stops` of exposure above the scene's own.
   Result<Image<std::uint8_t>> picture(int width, int height, double stops, std::stop_token stop);
+  /// The picture by the light there is, at once; whatever changed is lit behind it, and version() rises when that is done. The
+  /// very first picture waits for its light.
+  Result<Image<std::uint8_t>> picture_now(int width,
+                                          int height,
+                                          double stops,
+                                          std::stop_token stop);
+  /// Whether light is being found; look again for another version then.
+  bool is_lighting() const { return background_.busy(); }
+  /// Takes light that has been found since. Errors: those of SceneRenderer::light().
+  Result<void> catch_up();
   /// The next picture's device is lost: a rehearsal.
   void lose_device() {
     lose_next_ = true;
@@ -68,7 +80,13 @@ class ViewModel {
   /// Another one: the next picture differs from the last.
   std::uint64_t version() const { return version_; }
 
-  SceneRenderer& renderer() { return *renderer_; }
+  /// Stops lighting, which picture_now() begins again.
+  SceneRenderer& renderer() {
+    hold();
+    return *renderer_;
+  }
+  /// As of the last light.
+  const SceneStatistics& statistics() const { return statistics_; }
   const Scene& scene() const { return scene_; }
   const std::vector<LightOptions>& lights() const { return lights_; }
   double white() const { return white_; }
@@ -85,6 +103,13 @@ class ViewModel {
     ++version_;
   }
   Result<void> light(std::stop_token stop);
+  void hold();
+  void has_light();
+  Result<void> lose_if_asked();
+  Result<Image<std::uint8_t>> draw_or_reopen(int width,
+                                             int height,
+                                             double stops,
+                                             std::stop_token stop);
   Result<void> make_raster();
   Result<Image<std::uint8_t>> draw(int width, int height, double stops, std::stop_token stop);
 
@@ -102,6 +127,9 @@ class ViewModel {
   bool taken_ = false;  // the raster has what is lit
   bool lose_next_ = false;
   int device_losses_ = 0;
+  bool was_lit_ = false;
+  SceneStatistics statistics_;
+  BackgroundLight background_;  // last: it stops before the scene goes
 };
 
 }  // namespace opaline::render

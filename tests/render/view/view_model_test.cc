@@ -138,5 +138,40 @@ TEST_F(View, ALostDeviceIsReplaced) {
   EXPECT_EQ(model_->device_losses(), 1);
 }
 
+// A tolerance that takes the solver tens of iterations: the first pictures come before the light does.
+TEST_F(View, ShowsTheLightThereWasWhileItFindsTheNext) {
+  const auto before = picture();
+  const std::uint64_t old = model_->version();
+  model_->turn_light(0, 120.0, 0.0);
+  const auto at_once = model_->picture_now(kWidth, kHeight, 0.0, {});
+  ASSERT_TRUE(at_once) << at_once.error().message;
+  EXPECT_EQ(largest_difference(*at_once, before), 0);
+  EXPECT_TRUE(model_->is_lighting());
+  while (model_->is_lighting()) ASSERT_TRUE(model_->catch_up());
+  EXPECT_GT(model_->version(), old + 1);
+  const auto later = model_->picture_now(kWidth, kHeight, 0.0, {});
+  ASSERT_TRUE(later) << later.error().message;
+  EXPECT_GT(largest_difference(*later, before), 20);
+  EXPECT_LE(largest_difference(picture(), *later), 1);
+}
+
+TEST_F(View, AStrokeWhileLightIsFoundIsLitToo) {
+  const auto before = picture();
+  model_->turn_light(0, 10.0, 0.0);
+  ASSERT_TRUE(model_->picture_now(kWidth, kHeight, 0.0, {}));
+  EditOptions brush;
+  brush.operation = EditOptions::Operation::kPaint;
+  brush.value = {0.9, 0.01, 0.01};
+  ASSERT_TRUE(model_->paint(kX, kY, kWidth, kHeight, brush));
+  EXPECT_FALSE(model_->is_lighting());
+  ASSERT_TRUE(model_->picture_now(kWidth, kHeight, 0.0, {}));
+  EXPECT_TRUE(model_->is_lighting());
+  while (model_->is_lighting()) ASSERT_TRUE(model_->catch_up());
+  const auto painted = model_->picture_now(kWidth, kHeight, 0.0, {});
+  ASSERT_TRUE(painted);
+  EXPECT_GT(largest_difference(*painted, before), 20);
+  EXPECT_LE(largest_difference(picture(), *painted), 1);
+}
+
 }  // namespace
 }  // namespace opaline::render
