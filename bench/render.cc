@@ -1,9 +1,12 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "base/log.h"
@@ -23,6 +26,8 @@
 //   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1 against finite elements of half the size, 8 times
 //              as many, and what those themselves are still off (a third of what they differ from the same size, uniform)
 //   transport  their exitance against Monte Carlo through the tetrahedra, split into model, discretisation and noise
+//   dials      processor seconds of one picture's light against its error, of the torus, for each method, size, K, tolerance and
+//              precision, and with and without the correction of links that lean
 //   mesh       seconds from a triangle mesh to a graph with its hierarchy; angles
 //   frames     frames a second of the diffusion pass, a light moving 2 degrees a frame; processor seconds of one such frame on
 //              one thread, which a busy machine hardly slows; iterations saved by warm starts, of the light and of a brush
@@ -48,7 +53,9 @@ void measure_sphere() {
   for (const auto& [name, tets] : {std::pair{"13k", 13e3}, std::pair{"52k", 52e3}}) {
     const render::TetMesh mesh = bench::cut(*sphere, tets);
     bench::print_figure("render.sphere_tets", name, static_cast<double>(mesh.tets.size()), "1");
-    bench::print_figure("render.sphere_rms_graph", name, bench::graph_error(mesh, team), "1");
+    bench::print_figure("render.sphere_rms_graph", name, bench::graph_error(mesh, 20, team), "1");
+    bench::print_figure(
+        "render.sphere_rms_two_point", name, bench::graph_error(mesh, 0, team), "1");
     bench::print_figure("render.sphere_rms_fem", name, bench::elements_error(mesh, team), "1");
   }
   for (const auto& [name, spacing] : {std::pair{"h1.25", 1.25}, std::pair{"h0.8", 0.8}}) {
@@ -81,6 +88,62 @@ void measure_accuracy() {
         bench::print_figure("render.error_vs_fem", which, marble.error_against(reference), "1");
         bench::print_figure(
             "render.error_vs_fem_tets", which, static_cast<double>(marble.tetrahedra()), "1");
+      }
+    }
+  }
+}
+
+/// One method and size, and what each tolerance makes of it.
+void measure_dial(const std::string& which,
+                  const render::SignedDistance& solid,
+                  render::DiffusionOptions options,
+                  const bench::LitMarble& reference,
+                  ThreadTeam& team) {
+  constexpr int kFrames = 9;
+  for (const auto& [tolerances, precision] :
+       {std::pair{std::vector{1e-1, 1e-2, 1e-3, 1e-4}, "single"}, {std::vector{1e-6}, "double"}}) {
+    options.tolerance = tolerances.back();
+    bench::LitMarble marble(solid, options, team);
+    if (precision == std::string("single")) {
+      bench::print_figure(
+          "render.dial_unknowns", which, static_cast<double>(marble.unknowns()), "1");
+    }
+    for (const double tolerance : tolerances) {
+      marble.set_tolerance(tolerance);
+      const double seconds = marble.frame_seconds(kFrames);
+      const std::string name = fmt::format("{}-{:.0e}", which, tolerance);
+      bench::print_figure("render.dial_frame_seconds", name, seconds, "s");
+      bench::print_figure("render.dial_error", name, marble.error_against(reference), "1");
+    }
+  }
+}
+
+void measure_dials() {
+  ThreadTeam team(1);
+  const auto solid = bench::shape("torus");
+  const double volume = render::estimate_volume(*solid);
+  using enum render::Discretisation;
+  const bench::LitMarble reference(*solid,
+                                   {.method = kElements,
+                                    .spacing_mm = 0.5 * render::spacing_for(volume, 1.4e5),
+                                    .interior_growth = 0.0,
+                                    .tolerance = 1e-8},
+                                   team);
+  for (const auto& [name, method, corrections] : {std::tuple{"elements", kElements, 0},
+                                                  {"graph", kGraph, 8},
+                                                  {"two_point", kGraph, 0},
+                                                  {"polygrid", kPolygrid, 0}}) {
+    for (const auto& [size, tets] : {std::pair{"30k", 3e4}, {"140k", 1.4e5}}) {
+      for (const auto& [k, growth] : {std::pair{"K0.1", 0.1}, {"K1", 1.0}}) {
+        if (method == kPolygrid && growth == 1.0) continue;  // its lattice has one size
+        measure_dial(fmt::format("{}-{}-{}", name, size, k),
+                     *solid,
+                     {.method = method,
+                      .spacing_mm = render::spacing_for(volume, tets),
+                      .interior_growth = growth,
+                      .corrections = corrections},
+                     reference,
+                     team);
       }
     }
   }
@@ -277,6 +340,7 @@ void measure_growth() {
 int main(int argc, char** argv) try {
   const std::map<std::string, std::function<void()>> groups{{"accuracy", measure_accuracy},
                                                             {"transport", measure_transport},
+                                                            {"dials", measure_dials},
                                                             {"sphere", measure_sphere},
                                                             {"mesh", measure_mesh},
                                                             {"frames", measure_frames},
@@ -287,16 +351,16 @@ int main(int argc, char** argv) try {
       "Accuracy and speed of the renderer's numerical ground.\n\nExample: scripts/bench render "
       "sphere mesh"};
   std::vector<std::string> chosen;
-  app.add_option(
-      "groups",
-      chosen,
-      "accuracy, transport, sphere, mesh, frames, published, raster, growth; all by default");
+  app.add_option("groups",
+                 chosen,
+                 "accuracy, dials, transport, sphere, mesh, frames, published, raster, growth; all "
+                 "by default");
   CLI11_PARSE(app, argc, argv);
   for (const auto& name : chosen) {
     if (groups.contains(name)) continue;
     opaline::log::error(
-        "no group \"{}\"; there are accuracy, transport, sphere, mesh, frames, published, raster, "
-        "growth",
+        "no group \"{}\"; there are accuracy, dials, transport, sphere, mesh, frames, published, "
+        "raster, growth",
         name);
     return 2;
   }

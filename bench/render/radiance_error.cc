@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 
 #include "base/ensure.h"
 #include "base/log.h"
+#include "bench/figure.h"
 #include "bench/render/render_case.h"
+#include "bench/stopwatch.h"
 #include "reconstruct/diffusion/fresnel.h"
 #include "render/trace/triangle_tree.h"
 #include "render/trace/vertex_values.h"
@@ -20,6 +23,7 @@ using render::TriangleTree;
 
 constexpr double kIor = 1.3;
 constexpr Vec3 kTowards{0.6, 0.48, 0.64};
+constexpr double kStepDegrees = 2.0;
 using Colour = std::array<double, 3>;
 
 Colour radiance(const render::SurfaceLight& light, std::size_t v) {
@@ -55,9 +59,27 @@ LitMarble::LitMarble(const render::SignedDistance& solid,
   auto body = render::Subsurface::create(solid, marbled_optics, kIor, options, team, {});
   ENSURE(body.has_value());
   body_ = *std::move(body);
+  light_from(0.0);
+}
+
+double LitMarble::frame_seconds(int frames) {
+  std::vector<double> seconds;
+  for (int f = frames - 1; f >= 0; --f) {
+    const Stopwatch watch;
+    light_from(-kStepDegrees * f);
+    seconds.push_back(watch.cpu());
+  }
+  return median(seconds);
+}
+
+void LitMarble::light_from(double degrees) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Vec3 towards{kTowards.x * std::cos(angle) - kTowards.y * std::sin(angle),
+                     kTowards.x * std::sin(angle) + kTowards.y * std::cos(angle),
+                     kTowards.z};
   std::vector<std::array<float, 3>> q;
   for (const render::SurfacePlace& place : body_->places()) {
-    q.emplace_back().fill(static_cast<float>(std::max(0.0, dot(place.normal, kTowards))));
+    q.emplace_back().fill(static_cast<float>(std::max(0.0, dot(place.normal, towards))));
   }
   const auto solved = body_->light(q, {}, {});
   if (!solved) log::error("{}", solved.error().message);
