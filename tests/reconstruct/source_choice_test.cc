@@ -59,7 +59,8 @@ Dataset simulated(bool diffuse) {
   for (const bool held_out : {false, true}) {
     for (int n = 0; n < 4; ++n) {
       const double shift = held_out ? 0.5 * kRegion : kRegion;
-      dataset.illuminations.push_back(lit_region(n % 2 * shift, n / 2 * shift, diffuse));
+      const int row = n / 2;
+      dataset.illuminations.push_back(lit_region(n % 2 * shift, row * shift, diffuse));
       dataset.illuminations.back().name = fmt::format("light_{}_{}", n, held_out);
       dataset.illuminations.back().held_out = held_out;
     }
