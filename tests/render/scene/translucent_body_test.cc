@@ -210,7 +210,8 @@ EditOptions dark_spot() {
 TEST_F(Body, PaintedShinesAsOneMadeOfTheSavedMaterial) {
   for (const Discretisation method :
        {Discretisation::kElements, Discretisation::kGraph, Discretisation::kPolygrid}) {
-    const DiffusionOptions diffusion{.method = method, .tetrahedra = 5e3, .tolerance = 1e-7};
+    const DiffusionOptions diffusion{
+        .method = method, .tetrahedra = 5e3, .tolerance = 1e-7, .corrections = 100};
     const auto body = made(torus(), diffusion);
     solve(*body);
     const Values before = body->subsurface().lit().fluence;
