@@ -93,7 +93,8 @@ Result<void> SessionSupervisor::act(const Decision& decision, BusyStations& stat
 // Empty when the stage can have its station.
 std::string SessionSupervisor::station_obstacle(std::size_t stage,
                                                 const BusyStations& stations) const {
-  static constexpr const char* kInUse = "the station is in use by another session";
+  static constexpr const char* kInUse =
+      "the station is in use by another session, a calibration or a viewfinder";
   if (kStages[stage] != kStationStage || station_lock_.empty()) return {};
   if (retry_after_ && neighbours_.clock.now() < *retry_after_) return kInUse;
   const Result<bool> held = FileLock::is_held(station_lock_);

@@ -17,7 +17,7 @@ namespace {
 using calibration::MeasuredLens;
 using calibration::Record;
 using calibration::StepRecord;
-using Rows = std::vector<std::vector<std::string>>;
+using TableRows = std::vector<std::vector<std::string>>;
 
 constexpr const char* kCameraColor = "#2b5fc0";
 constexpr const char* kProjectorColor = "#d08a1d";
@@ -243,7 +243,7 @@ std::array<double, 9> parameters_of(const CameraModel& lens) {
           lens.distortion[4]};
 }
 
-void add_lens(Rows& rows,
+void add_lens(TableRows& rows,
               const char* name,
               const std::optional<MeasuredLens>& now,
               const std::optional<MeasuredLens>& then) {
@@ -263,7 +263,7 @@ void add_lens(Rows& rows,
   }
 }
 
-void add_place(Rows& rows,
+void add_place(TableRows& rows,
                const std::optional<MeasuredLens>& now,
                const std::optional<MeasuredLens>& then) {
   if (!now) return;
@@ -281,7 +281,7 @@ void add_place(Rows& rows,
 }
 
 std::string lens_table(const Record& record, const std::optional<Record>& before) {
-  Rows rows;
+  TableRows rows;
   const auto camera = before ? before->measured.camera_lens : std::nullopt;
   const auto projector = before ? before->measured.projector_lens : std::nullopt;
   add_lens(rows, "camera", record.measured.camera_lens, camera);
@@ -295,7 +295,7 @@ std::string lens_table(const Record& record, const std::optional<Record>& before
 }
 
 std::string pose_table(const StepRecord& step) {
-  Rows rows;
+  TableRows rows;
   for (const auto& pose : poses_of(step)) {
     const std::string reason = pose.value("left_out", "");
     rows.push_back({pose.value("name", ""),

@@ -21,6 +21,7 @@ using calibration::PoseSight;
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBetweenShown{500};
+constexpr std::chrono::milliseconds kBoardShown{3000};  // its picture is the one to look at
 constexpr std::size_t kMostTyped = 256;
 
 nlohmann::json tilts_of(const calibration::PoseGuide& guide) {
@@ -53,7 +54,7 @@ std::string LiveAttendant::typed() {
 bool LiveAttendant::is_due() {
   if (options_.live == nullptr) return false;
   const auto now = SteadyClock::now();
-  if (shown_ && now - *shown_ < kBetweenShown) return false;
+  if (shown_ && now - *shown_ < (waiting_ ? kBoardShown : kBetweenShown)) return false;
   shown_ = now;
   return true;
 }
@@ -111,6 +112,7 @@ void LiveAttendant::saw(const PoseSight& sight) {
                    {"next", sight.guide.wish}};
   show(*png, std::move(json));
   shown_ = SteadyClock::now();
+  waiting_ = !sight.taken;
 }
 
 void LiveAttendant::show(std::span<const std::byte> png, nlohmann::json figures) {

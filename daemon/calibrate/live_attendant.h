@@ -48,6 +48,7 @@ class LiveAttendant : public calibration::Attendant {
   std::string step_;    // guarded by mutex_
   std::string detail_;  // guarded by mutex_
   std::optional<std::chrono::steady_clock::time_point> shown_;
+  bool waiting_ = false;  // for a pose, in what was shown last
   double best_focus_ = 0.0;
   bool keyboard_ = true;
   bool complained_ = false;

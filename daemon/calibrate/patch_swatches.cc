@@ -14,7 +14,7 @@ namespace {
 
 using calibration::Lab;
 
-constexpr int kAcross = 6;
+constexpr int kPatchesAcross = 6;
 constexpr int kSide = 76;
 constexpr int kApart = 6;
 constexpr int kInner = 40;
@@ -43,8 +43,8 @@ std::string swatch(int index, const std::string& name, const Lab& published, con
       "<rect width=\"{}\" height=\"{}\" fill=\"{}\"/>"
       "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>"
       "<text x=\"3\" y=\"{}\" font-size=\"11\" fill=\"{}\">{:.2f}</text></g>",
-      index % kAcross * (kSide + kApart),
-      index / kAcross * (kSide + kApart),
+      index % kPatchesAcross * (kSide + kApart),
+      index / kPatchesAcross * (kSide + kApart),
       html::escaped(name),
       kSide,
       kSide,
@@ -66,11 +66,11 @@ std::string patch_swatches(const calibration::Record& record) {
   const auto patches =
       step == nullptr ? nlohmann::json() : step->values.value("patches", nlohmann::json());
   if (!patches.is_array() || patches.empty()) return {};
-  const int rows = (static_cast<int>(patches.size()) + kAcross - 1) / kAcross;
+  const int rows = (static_cast<int>(patches.size()) + kPatchesAcross - 1) / kPatchesAcross;
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"sans-serif\">",
-      kAcross * (kSide + kApart),
+      kPatchesAcross * (kSide + kApart),
       rows * (kSide + kApart));
   int index = 0;
   for (const auto& patch : patches) {

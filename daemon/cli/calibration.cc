@@ -133,16 +133,12 @@ std::map<std::string, double> figures_of(const Record& record) {
   return figures;
 }
 
-}  // namespace
-
-Result<void> list_calibrations(const CalibrationPlace& place) {
-  const auto store = store_of(place);
-  if (!store) return store.error();
-  const auto active = store->active();
+Result<void> list_of(const Store& store) {
+  const auto active = store.active();
   if (!active) return active.error();
   fmt::print("   version  state       created                   worst figure\n");
-  for (const int version : store->versions()) {
-    const auto record = store->read(version);
+  for (const int version : store.versions()) {
+    const auto record = store.read(version);
     if (!record) {
       fmt::print("   {:>7}  unreadable  {}\n", version, record.error().message);
       continue;
@@ -155,6 +151,22 @@ Result<void> list_calibrations(const CalibrationPlace& place) {
                worst_of(*record));
   }
   fmt::print("\n{}\n", *active ? "* is active: sessions use it" : "none is active");
+  return ok();
+}
+
+}  // namespace
+
+Result<void> list_calibrations(const CalibrationPlace& place) {
+  const std::vector<std::string> stations = calibration::stations_in(place.root);
+  if (!place.station.empty() || stations.size() < 2) {
+    const auto store = store_of(place);
+    return store ? list_of(*store) : Result<void>(store.error());
+  }
+  for (const std::string& station : stations) {
+    fmt::print("station {}\n", station);
+    if (auto listed = list_of(Store(system_files(), place.root, station)); !listed) return listed;
+    fmt::print("\n");
+  }
   return ok();
 }
 

@@ -63,7 +63,10 @@ void CalibrationCommands::declare_calibrate(CLI::App& app,
       "  opaline calibrate config/sim-rig.toml\n"
       "  opaline calibrate --resume config/sim-rig.toml\n"
       "  opaline calibrate --step black_level config/sim-rig.toml\n"
-      "  opaline calibrate --view /tmp/view config/sim-rig.toml");
+      "  opaline calibrate --view /tmp/view config/sim-rig.toml\n"
+      "  opaline calibrate --attended config/sim-boards.toml       lenses, by a board that "
+      "somebody holds\n"
+      "  opaline calibrate --step colour config/sim-rig-chart.toml");
   sub->callback(
       [this, &programs, &status] { status = report(become_calibrate(programs, wish_, place_)); });
 }

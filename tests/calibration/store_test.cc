@@ -48,6 +48,8 @@ TEST_F(StoreTest, RollsBackInOneCall) {
   EXPECT_FALSE(store_.read_active()->has_value());
   ASSERT_TRUE(store_.activate(1));
   ASSERT_TRUE(store_.activate(2));
+  EXPECT_EQ(store_.used_before(2)->value(), 1);
+  EXPECT_FALSE(store_.used_before(1)->has_value());
   ASSERT_TRUE(store_.activate(1));
   EXPECT_EQ(store_.active()->value(), 1);
   EXPECT_EQ(store_.read_active()->value().version, 1);

@@ -118,8 +118,12 @@ TEST_F(CalibrateProgram, CalibratesRefusesResumesAndRollsBack) {
   EXPECT_THAT(
       resumed.text,
       AllOf(HasSubstr("calibration 2 is accepted"), Not(HasSubstr("black_level accepted"))));
-  EXPECT_EQ(call("opaline", {"calibration", "activate", "1"}).status, 0);
+  EXPECT_THAT(call("opaline", {"calibration", "rollback"}).text,
+              HasSubstr("calibration 2 is left, calibration 1 is active"));
   EXPECT_THAT(call("opaline", {"calibration", "list"}).text, HasSubstr("*        1  accepted"));
+  EXPECT_THAT(call("opaline", {"calibration", "rollback"}).text,
+              HasSubstr("nothing to go back to"));
+  EXPECT_EQ(call("opaline", {"calibration", "activate", "2"}).status, 0);
   EXPECT_THAT(call("opaline", {"calibration", "show", "2"}).text,
               HasSubstr("gain_electrons_per_code = [2."));
   EXPECT_THAT(call("opaline", {"calibration", "diff", "1", "2"}).text, HasSubstr("version 2"));
