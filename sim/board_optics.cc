@@ -128,12 +128,7 @@ BoardOptics::Look BoardOptics::look(const SimBoardPose& pose) const {
 Image<float> BoardOptics::projected(const Image<std::uint8_t>& codes) const {
   const int channels = is_grey(codes) ? 1 : 3;
   Image<float> picture(codes.width(), codes.height(), channels);
-  std::array<float, 256> light{};
-  for (std::size_t code = 0; code < light.size(); ++code) {
-    light[code] = static_cast<float>(
-        projector_.black_level + (1.0 - projector_.black_level) *
-                                     std::pow(static_cast<double>(code) / 255.0, projector_.gamma));
-  }
+  const std::array<float, 256> light = light_of_codes(projector_);
   for (std::size_t i = 0; i < picture.pixel_count(); ++i) {
     for (int c = 0; c < channels; ++c) {
       picture.samples()[i * channels + c] =

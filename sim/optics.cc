@@ -42,11 +42,7 @@ Coverage coverage(double from, double to, int size) {
 
 /// Irradiance of every projector pixel over the peak.
 Image<float> relative_light(const ProjectorOptics& options, const Image<std::uint8_t>& codes) {
-  std::array<float, 256> light{};
-  for (int code = 0; code < 256; ++code) {
-    const double linear = std::pow(code / 255.0, options.gamma);
-    light[code] = static_cast<float>(options.black_level + (1.0 - options.black_level) * linear);
-  }
+  const std::array<float, 256> light = light_of_codes(options);
   const Image<float> falloff = vignetting_map(codes.width(), codes.height(), options.vignetting);
   Image<float> picture(codes.width(), codes.height(), 3);
   for (std::size_t i = 0; i < picture.samples().size(); ++i) {
@@ -76,6 +72,15 @@ double segment_seconds(double turn, int channel, double until) {
 }
 
 }  // namespace
+
+std::array<float, 256> light_of_codes(const ProjectorOptics& options) {
+  std::array<float, 256> light{};
+  for (std::size_t code = 0; code < light.size(); ++code) {
+    const double linear = std::pow(static_cast<double>(code) / 255.0, options.gamma);
+    light[code] = static_cast<float>(options.black_level + (1.0 - options.black_level) * linear);
+  }
+  return light;
+}
 
 CameraModel demo_camera_model() {
   const double tilt = 10.0 * std::numbers::pi / 180.0;

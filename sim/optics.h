@@ -78,6 +78,9 @@ struct ProjectorOptics {
 };
 Result<void> validate(const ProjectorOptics& options);
 
+/// black_level + (1 - black_level) (code/255)^gamma of each code.
+std::array<float, 256> light_of_codes(const ProjectorOptics& options);
+
 /// 1 + v0 r^2 + v1 r^4 + v2 r^6 at each pixel of a picture, 1 channel.
 Image<float> vignetting_map(int width, int height, const std::array<double, 3>& coefficients);
 

@@ -59,31 +59,6 @@ void swap_red_and_blue(Image<std::uint16_t>& pixels) {
   for (std::size_t i = 0; i + 2 < s.size(); i += 3) std::swap(s[i], s[i + 2]);
 }
 
-/// Responses hold for one place of the camera; within a hundredth of its distance the picture is the same.
-Result<void> check_view(const TransportResponses& r, const CameraModel& camera) {
-  const Vec3 middle = r.block.face_cell_centre(
-      r.seen_face, r.block.face_width(r.seen_face) / 2, r.block.face_height(r.seen_face) / 2);
-  const double off = length(camera.centre() - r.camera_centre);
-  if (off <= 0.01 * length(r.camera_centre - middle)) return ok();
-  return invalid_argument(fmt::format("made for a camera {:.1f} mm away from where it is", off));
-}
-
-Result<void> check(const TransportResponses& r, const CameraModel& camera) {
-  if (r.patches_x < 1 || r.patches_y < 1 ||
-      r.patches.size() != static_cast<std::size_t>(r.patches_x) * r.patches_y) {
-    return invalid_argument(fmt::format(
-        "{} responses for {} x {} patches", r.patches.size(), r.patches_x, r.patches_y));
-  }
-  for (const PatchResponse& patch : r.patches) {
-    if (patch.radiance.width() != r.block.face_width(r.seen_face) ||
-        patch.radiance.height() != r.block.face_height(r.seen_face) ||
-        patch.radiance.channels() != 3) {
-      return invalid_argument("a response's size is not that of the seen face's cells");
-    }
-  }
-  return check_view(r, camera);
-}
-
 }  // namespace
 
 /// One exposure from trigger to delivery, with the faults that strike it.
@@ -112,7 +87,7 @@ Result<std::unique_ptr<Rig>> Rig::create(const RigOptions& options,
                                          std::shared_ptr<const TransportResponses> responses,
                                          Clock* clock) {
   if (auto good = validate(options); !good) return good.error().in("rig");
-  if (auto good = check(*responses, options.camera.model); !good)
+  if (auto good = check_responses(*responses, options.camera.model); !good)
     return good.error().in("transport responses");
   return create(options,
                 std::make_shared<const StationOptics>(

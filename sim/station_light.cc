@@ -1,5 +1,7 @@
 #include "sim/station_light.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -125,7 +127,32 @@ void blur_line(float* samples,
   }
 }
 
+/// Responses hold for one place of the camera; within a hundredth of its distance the picture is the same.
+Result<void> check_view(const TransportResponses& r, const CameraModel& camera) {
+  const Vec3 middle = r.block.face_cell_centre(
+      r.seen_face, r.block.face_width(r.seen_face) / 2, r.block.face_height(r.seen_face) / 2);
+  const double off = length(camera.centre() - r.camera_centre);
+  if (off <= 0.01 * length(r.camera_centre - middle)) return ok();
+  return invalid_argument(fmt::format("made for a camera {:.1f} mm away from where it is", off));
+}
+
 }  // namespace
+
+Result<void> check_responses(const TransportResponses& r, const CameraModel& camera) {
+  if (r.patches_x < 1 || r.patches_y < 1 ||
+      r.patches.size() != static_cast<std::size_t>(r.patches_x) * r.patches_y) {
+    return invalid_argument(fmt::format(
+        "{} responses for {} x {} patches", r.patches.size(), r.patches_x, r.patches_y));
+  }
+  for (const PatchResponse& patch : r.patches) {
+    if (patch.radiance.width() != r.block.face_width(r.seen_face) ||
+        patch.radiance.height() != r.block.face_height(r.seen_face) ||
+        patch.radiance.channels() != 3) {
+      return invalid_argument("a response's size is not that of the seen face's cells");
+    }
+  }
+  return check_view(r, camera);
+}
 
 Image<float> blurred(const Image<float>& picture, double sigma_px) {
   if (sigma_px <= 0.0 || picture.empty()) return picture;

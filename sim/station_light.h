@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/image.h"
+#include "base/result.h"
 #include "base/transport_responses.h"
 #include "sim/optics.h"
 #include "sim/surface_reflectance.h"
@@ -71,6 +72,9 @@ class StationOptics : public LightPath {
   std::vector<std::uint32_t> first_share_;  ///< per pixel, and one behind the last
   std::vector<Share> shares_;
 };
+
+/// Whether responses are whole, and made for where the camera stands, to a hundredth of its distance. Errors: kInvalidArgument.
+Result<void> check_responses(const TransportResponses& responses, const CameraModel& camera);
 
 /// A picture convolved with a Gaussian, mirrored at its borders, so that no light is lost.
 Image<float> blurred(const Image<float>& picture, double sigma_px);
