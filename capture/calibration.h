@@ -45,6 +45,9 @@ struct ExposureFactor {
 /// and nothing of what lies above full_scale, or above its full well where that is less.
 struct CameraCalibration {
   CameraModel model;
+  /// How well its place before the sample is known: covariance of small motions (w, s), rad and mm along the camera's axes, row by
+  /// row, p_camera = exp([w]x) R p + t + s; 0: taken for exact.
+  std::array<double, 36> place_covariance{};
   int bit_depth = 12;
   ResponseCurve response;
   double black_level = 64.0;                         ///< code without light

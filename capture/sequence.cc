@@ -433,8 +433,9 @@ Result<CaptureSummary> capture_session(const CaptureTask& task,
   auto patterns = make_patterns(
       task.options.patterns, task.sample.block, task.sample.lit_face, task.calibration.projector);
   if (!patterns) return patterns.error();
-  auto map =
-      SurfaceMap::create(task.sample.block, task.sample.seen_face, task.calibration.camera.model);
+  const CameraCalibration& camera = task.calibration.camera;
+  auto map = SurfaceMap::create(
+      task.sample.block, task.sample.seen_face, camera.model, camera.place_covariance);
   if (!map) return map.error();
   return Sequence(task, station, workplace, *std::move(patterns), *std::move(map)).run(stop);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -89,6 +90,47 @@ Result<void> check_direction(const Block& block, Face face, const CameraModel& c
   return ok();
 }
 
+Vec3 column_axis(Face face) { return axis_of(face) == 0 ? Vec3{0, 1, 0} : Vec3{1, 0, 0}; }
+Vec3 row_axis(Face face) { return axis_of(face) == 2 ? Vec3{0, 1, 0} : Vec3{0, 0, 1}; }
+
+// How the point that a ray meets on the face moves with each of the six motions: along columns and rows, mm.
+std::array<std::array<double, 6>, 2> slides(const CameraModel& camera, Face face, Vec3 point) {
+  const Pose& place = camera.camera_from_sample;
+  const Pose back = place.inverse();
+  const Vec3 turned = place.rotate(point);
+  const Vec3 ray = normalized(point - camera.centre());
+  const Vec3 normal = outward_normal(face);
+  constexpr std::array<Vec3, 3> kAxes{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  std::array<std::array<double, 6>, 2> slope{};
+  for (std::size_t k = 0; k < 6; ++k) {
+    const Vec3 motion = back.rotate(k < 3 ? cross(kAxes[k], turned) : kAxes[k - 3]);
+    const Vec3 slid = ray * (dot(normal, motion) / dot(normal, ray)) - motion;
+    slope[0][k] = dot(slid, column_axis(face));
+    slope[1][k] = dot(slid, row_axis(face));
+  }
+  return slope;
+}
+
+double carried(const std::array<double, 6>& a,
+               const std::array<double, 36>& covariance,
+               const std::array<double, 6>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) sum += a[i] * covariance[6 * i + j] * b[j];
+  }
+  return sum;
+}
+
+// Of neighbours that are seen; from one of them where there is but one, and 0 with none.
+double slope_between(const SurfaceRadiance& s,
+                     int c,
+                     std::array<int, 2> from,
+                     std::array<int, 2> to) {
+  const double steps = std::max(to[0] - from[0], to[1] - from[1]);
+  if (steps == 0.0) return 0.0;
+  return (s.radiance.at(to[0], to[1], c) - s.radiance.at(from[0], from[1], c)) / steps;
+}
+
 Error sees_nothing(Face face) {
   return invalid_argument(
       fmt::format("the camera sees nothing of face {}: is its pose right?", to_string(face)));
@@ -127,7 +169,10 @@ void SurfaceMap::drop_partial_pixels(const CameraModel& camera) {
   }
 }
 
-Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const CameraModel& camera) {
+Result<SurfaceMap> SurfaceMap::create(const Block& block,
+                                      Face face,
+                                      const CameraModel& camera,
+                                      const std::array<double, 36>& place_covariance) {
   if (auto direction = check_direction(block, face, camera); !direction) return direction.error();
   SurfaceMap map(block.face_width(face), block.face_height(face));
   map.view_ = view_of_face(block, face, camera.centre());
@@ -138,6 +183,11 @@ Result<SurfaceMap> SurfaceMap::create(const Block& block, Face face, const Camer
                     camera.project(face_point(block, face, column + 1, row + 1)),
                     camera.project(face_point(block, face, column, row + 1))},
                    camera);
+      const auto slide = slides(camera, face, block.face_cell_centre(face, column, row));
+      const auto [width, height] = face_cell_size(block, face);
+      map.cells_.back().place = {carried(slide[0], place_covariance, slide[0]) / (width * width),
+                                 carried(slide[1], place_covariance, slide[1]) / (height * height),
+                                 carried(slide[0], place_covariance, slide[1]) / (width * height)};
     }
   }
   map.drop_partial_pixels(camera);
@@ -184,7 +234,38 @@ SurfaceRadiance SurfaceMap::apply(const HdrImage& hdr, double min_coverage) cons
       }
     }
   }
+  add_place_variance(surface);
   return surface;
+}
+
+void SurfaceMap::add_place_variance(SurfaceRadiance& surface) const {
+  const auto seen = [&](int column, int row) {
+    return column >= 0 && row >= 0 && column < width_ && row < height_ &&
+           surface.mask.at(column, row) != 0;
+  };
+  for (int row = 0; row < height_; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      const PlaceVariance& place = cells_[static_cast<std::size_t>(row) * width_ + column].place;
+      if (!seen(column, row) || !(place.column + place.row > 0.0)) continue;
+      const std::array left{seen(column - 1, row) ? column - 1 : column, row};
+      const std::array right{seen(column + 1, row) ? column + 1 : column, row};
+      const std::array above{column, seen(column, row - 1) ? row - 1 : row};
+      const std::array below{column, seen(column, row + 1) ? row + 1 : row};
+      for (int c = 0; c < 3; ++c) {
+        const double across = slope_between(surface, c, left, right);
+        const double down = slope_between(surface, c, above, below);
+        surface.variance.at(column, row, c) +=
+            static_cast<float>(across * across * place.column + down * down * place.row +
+                               2.0 * across * down * place.both);
+      }
+    }
+  }
+}
+
+double SurfaceMap::place_deviation() const {
+  double most = 0.0;
+  for (const Cell& cell : cells_) most = std::max({most, cell.place.column, cell.place.row});
+  return std::sqrt(most);
 }
 
 }  // namespace opaline::capture

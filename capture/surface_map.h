@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -23,11 +24,22 @@ struct SurfaceRadiance {
 /// quadrilateral; its radiance is the mean over the usable pixels it lies on, weighted by the area
 /// shared (exact clipping), and its variance the sum of theirs with the weights squared. Pixels
 /// that reach over the face's edge see something else as well and are left out.
+///
+/// Where the camera's place is not exact, nor is the point of the face that a pixel sees. A small motion of what the camera sees moves
+/// the point p under its ray of direction d, on the face of normal n, by
+///
+///   u = -(m - d (n m) / (n d)),    m = [w]x R p + s in the sample's frame
+///
+/// (CameraCalibration::place_covariance), and a cell's variance gains g' Cov(u) g with g the radiance's slope there, by differences
+/// of its neighbours. All cells and lights share that error; as a variance it tells where the place matters, at edges and veins.
 class SurfaceMap {
  public:
   /// Errors: kInvalidArgument when the camera is behind the face, is turned away from it, or sees
   /// none of it.
-  static Result<SurfaceMap> create(const Block& block, Face face, const CameraModel& camera);
+  static Result<SurfaceMap> create(const Block& block,
+                                   Face face,
+                                   const CameraModel& camera,
+                                   const std::array<double, 36>& place_covariance = {});
   /// What create() would say against it, without the work: whether some cell's middle is in the
   /// picture.
   static Result<void> check(const Block& block, Face face, const CameraModel& camera);
@@ -48,14 +60,26 @@ class SurfaceMap {
   const std::vector<Share>& shares_of(std::size_t place) const { return cells_[place].shares; }
   double cell_area(std::size_t place) const { return cells_[place].area; }  ///< pixels
 
+  /// Of the point seen where a cell should be: variances along columns and rows, and their covariance, in cells.
+  struct PlaceVariance {
+    double column = 0.0;
+    double row = 0.0;
+    double both = 0.0;
+  };
+  const PlaceVariance& place_of(std::size_t place) const { return cells_[place].place; }
+  /// The largest standard deviation of them, in cells, either way.
+  double place_deviation() const;
+
  private:
   struct Cell {
     std::vector<Share> shares;
     double area = 0.0;  // of the whole quadrilateral, in pixels
+    PlaceVariance place;
   };
   SurfaceMap(int width, int height) : width_(width), height_(height) {}
   void add_cell(const std::vector<CameraModel::Pixel>& corners, const CameraModel& camera);
   void drop_partial_pixels(const CameraModel& camera);
+  void add_place_variance(SurfaceRadiance& surface) const;
   int width_;
   int height_;
   std::vector<Cell> cells_;  // row by row

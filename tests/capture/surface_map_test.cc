@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -60,6 +62,61 @@ TEST(SurfaceMap, PutsALinearFieldIntoTheRightCells) {
       // edge shift the mean by a small fraction of a pixel.
       EXPECT_NEAR(surface.radiance.at(column, row, 2), 2.0 + 0.3 * centre.x - 0.2 * centre.y, 2e-3);
     }
+  }
+}
+
+/// A motion drawn from the covariance of independent ones.
+CameraModel moved(CameraModel model,
+                  const std::array<double, 6>& deviations,
+                  std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::array<double, 6> m{};
+  for (std::size_t k = 0; k < 6; ++k) m[k] = deviations[k] * normal(random);
+  Pose& pose = model.camera_from_sample;
+  const Pose was = pose;
+  for (std::size_t column = 0; column < 3; ++column) {  // small: 1 + [w]x is a rotation
+    const Vec3 axis{was.rotation[column], was.rotation[3 + column], was.rotation[6 + column]};
+    const Vec3 turned = axis + cross({m[0], m[1], m[2]}, axis);
+    pose.rotation[column] = turned.x;
+    pose.rotation[3 + column] = turned.y;
+    pose.rotation[6 + column] = turned.z;
+  }
+  pose.translation = was.translation + Vec3{m[3], m[4], m[5]};
+  return model;
+}
+
+// Against pictures of cameras that truly stand elsewhere. The relative deviation of a mean of 200 squares is sqrt(2 / 200) = 10 %; four of them.
+TEST(SurfaceMap, AnUnsurePlaceIsVarianceWhereTheLightChanges) {
+  CameraModel model = camera(25.0, 0.0);
+  model.width = model.height = 64;  // for speed
+  model.fx = model.fy = 1000.0;
+  model.cx = model.cy = 32.0;
+  const std::array<double, 6> deviations{4e-4, 2e-4, 3e-4, 0.004, 0.002, 0.05};
+  std::array<double, 36> covariance{};
+  for (std::size_t k = 0; k < 6; ++k) covariance[7 * k] = deviations[k] * deviations[k];
+  const auto map = SurfaceMap::create(kBlock, Face::kZMax, model, covariance);
+  ASSERT_TRUE(map) << map.error().message;
+  const auto field = [](Vec3 p) { return 0.3 * p.x - 0.2 * p.y; };
+  const auto silent = [](HdrImage hdr) {
+    std::ranges::fill(hdr.variance.samples(), 0.0f);
+    return hdr;
+  };
+  const auto still = map->apply(silent(picture(model, field)), 0.5);
+  std::mt19937_64 random(5);
+  constexpr int kDraws = 200;
+  std::array<double, 3> squares{};
+  constexpr std::array<std::array<int, 2>, 3> kCells{{{2, 2}, {6, 5}, {10, 8}}};
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const auto other = map->apply(silent(picture(moved(model, deviations, random), field)), 0.5);
+    for (std::size_t i = 0; i < kCells.size(); ++i) {
+      const auto [column, row] = kCells[i];
+      const double off = other.radiance.at(column, row, 0) - still.radiance.at(column, row, 0);
+      squares[i] += off * off / kDraws;
+    }
+  }
+  for (std::size_t i = 0; i < kCells.size(); ++i) {
+    const auto [column, row] = kCells[i];
+    EXPECT_NEAR(squares[i] / still.variance.at(column, row, 0), 1.0, 0.4) << i;
   }
 }
 
