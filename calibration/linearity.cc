@@ -260,6 +260,11 @@ Result<StepRecord> linearity(StepContext& context) {
   if (!gamma) return gamma.error();
   m.projector_gamma = gamma->value;
   record.values["projector_gamma"] = gamma->value;
+  context.progress(0.9, "black");
+  const auto black = projector_black(context, *brightness);
+  if (!black) return black.error();
+  m.projector_black = *black;
+  if (*black) record.values["projector_black"] = **black;
   const double given = context.given.projector.gamma;
   record.gates.push_back(
       {"projector gamma",

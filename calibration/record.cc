@@ -86,6 +86,7 @@ ordered_json to_json(const Measured& m) {
     out["response"] = {{"kind", kind_name(m.response->kind)}, {"table", m.response->table}};
   }
   put("projector_gamma", m.projector_gamma);
+  put("projector_black", m.projector_black);
   put("gain_electrons_per_code", m.gain_electrons_per_code);
   put("read_noise_electrons", m.read_noise_electrons);
   if (m.color) {
@@ -176,6 +177,7 @@ Measured measured_from(const json& in) {
   m.clipping_code = number("clipping_code");
   if (in.contains("response")) m.response = response_from(in.at("response"));
   m.projector_gamma = number("projector_gamma");
+  m.projector_black = number("projector_black");
   m.gain_electrons_per_code = number("gain_electrons_per_code");
   m.read_noise_electrons = number("read_noise_electrons");
   if (in.contains("color")) m.color = color_from(in.at("color"));
@@ -313,6 +315,7 @@ capture::StationCalibration with_measured(capture::StationCalibration given,
     camera.model.camera_from_sample = place;
   }
   if (measured.projector_gamma) given.projector.gamma = *measured.projector_gamma;
+  if (measured.projector_black) given.projector.black_level = *measured.projector_black;
   return given;
 }
 

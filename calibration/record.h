@@ -71,6 +71,7 @@ struct Measured {
   std::optional<double> clipping_code;
   std::optional<capture::ResponseCurve> response;
   std::optional<double> projector_gamma;
+  std::optional<double> projector_black;  ///< light at code 0, as a share of that at 255
   std::optional<double> gain_electrons_per_code;
   std::optional<double> read_noise_electrons;
   std::optional<ColorCorrection> color;                   ///< of light above black, in any unit
@@ -111,7 +112,7 @@ std::string to_text(const Record& record);
 Result<Record> record_from_text(std::string_view text, const std::string& file);
 
 /// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times, hot pixels
-/// and lens, and the projector's gamma, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
+/// and lens, and the projector's gamma and black level, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
 /// who gave it had measured, stay as given.
 capture::StationCalibration with_measured(capture::StationCalibration given,
                                           const Measured& measured);

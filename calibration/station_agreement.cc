@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "calibration/procedure.h"
 #include "calibration/step.h"
@@ -15,6 +16,8 @@ constexpr double kRangeDoubt = 0.0005;  // ... or of the code range, whichever i
 constexpr double kWrong = 10.0;         // times as much
 constexpr double kGammaDoubt = 0.05;
 constexpr double kGammaWrong = 0.3;
+constexpr double kLeakDoubt = 0.2;         // of the projector's black level ...
+constexpr double kLeakDoubtFrom = 0.0002;  // ... and of its white
 
 Agreement compare_devices(const Record& record, const FrameTaker& taker) {
   const drivers::CameraInfo& c = taker.camera();
@@ -90,6 +93,17 @@ void judge_gamma(const Record& record, double now, Agreement& agreement) {
   }
 }
 
+void judge_projector_black(const Record& record,
+                           const std::optional<double>& now,
+                           Agreement& agreement) {
+  const std::optional<double>& then = record.measured.projector_black;
+  if (!then || !now) return;
+  const double off = std::abs(*now - *then);
+  if (off <= std::max(kLeakDoubt * *then, kLeakDoubtFrom)) return;
+  agreement.doubts.push_back(fmt::format(
+      "drifted projector black: {:.5f} of white now, {:.5f} when calibrated", *now, *then));
+}
+
 }  // namespace
 
 Result<Agreement> compare_with_station(const Record& record,
@@ -114,6 +128,10 @@ Result<Agreement> compare_with_station(const Record& record,
   const auto gamma = gamma_now(context, *brightness);
   if (!gamma) return gamma.error();
   judge_gamma(record, *gamma, agreement);
+  if (!agreement.wrong.empty()) return agreement;
+  const auto leak = projector_black(context, *brightness);
+  if (!leak) return leak.error();
+  judge_projector_black(record, *leak, agreement);
   return agreement;
 }
 

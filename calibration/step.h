@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string_view>
@@ -63,6 +64,14 @@ Result<Brightness> find_brightness(StepContext& context);
 Result<Brightness> find_dim_light(StepContext& context);
 /// What refuses a step whose light will not do.
 std::vector<Gate> brightness_gates(const Brightness& brightness);
+
+/// The projector's light at code 0 as a share of that at code 255, ProjectorCalibration::black_level b: of the light D of a lamp that is off, L0 of
+/// code 0, and Lc of a code c,
+///
+///   b / (1 - b) = (L0 - D) / ((Lc - L0) (255 / c)^gamma)
+///
+/// over pixels at least half as bright as the brightest, in exposures up to 64 times as long as white wants. None where noise hides it.
+Result<std::optional<double>> projector_black(StepContext& context, const Brightness& brightness);
 
 /// Exposures of one light, shortest first.
 struct Stack {

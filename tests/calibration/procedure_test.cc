@@ -96,6 +96,10 @@ TEST_F(ProcedureTest, FindsWhatALinearCameraWasMadeFrom) {
   EXPECT_NEAR(*m.gain_electrons_per_code, 2.5, 0.02 * 2.5);
   EXPECT_NEAR(*m.read_noise_electrons, 3.0, 0.15);
   EXPECT_NEAR(*m.projector_gamma, options_.projector.gamma, 0.01);
+  // White is known as well as gamma, 0.01 ln(255 / code), and exposures to 1e-4.
+  EXPECT_NEAR(
+      *m.projector_black, options_.projector.black_level, 0.02 * options_.projector.black_level);
+  EXPECT_EQ(with_measured(given_, m).projector.black_level, *m.projector_black);
   EXPECT_EQ(kept_.size(), kSteps.size() - 1);  // no board
   EXPECT_LT(record_.margin(), 0.75);
 }
@@ -249,6 +253,9 @@ TEST_F(ProcedureTest, AStationAgreesWithItsCalibrationUntilSomethingChanges) {
   ASSERT_TRUE(rig_->arm({}));
   always(sim::FaultKind::kGammaOn);
   EXPECT_THAT(compare()->wrong, HasSubstr("projector gamma"));
+  options_.projector.black_level *= 2.0;  // the lamp's iris, say
+  build();
+  EXPECT_THAT(compare()->doubts, ElementsAre(HasSubstr("drifted projector black: 0.0020")));
   options_.seed = 2;
   build();
   EXPECT_THAT(compare()->wrong, HasSubstr("(sim-1)"));
