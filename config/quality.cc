@@ -8,6 +8,7 @@ void apply(Quality quality, SessionConfig& s) {
       s.capture.patterns.regions = 2;
       s.capture.exposures.ratio = 8.0;
       s.capture.exposures.wanted_snr = 25.0;
+      s.capture.exposures.planned_snr = 50.0;
       s.reduction.grid_step = 2.0;
       s.reconstruction.tolerance = 1e-3;
       s.reconstruction.max_iterations = 20;
@@ -20,6 +21,7 @@ void apply(Quality quality, SessionConfig& s) {
       s.capture.patterns.regions = 8;
       s.capture.exposures.ratio = 2.0;
       s.capture.exposures.wanted_snr = 100.0;
+      s.capture.exposures.planned_snr = 200.0;
       s.reconstruction.tolerance = 1e-6;
       s.reconstruction.max_iterations = 1000;
       s.reconstruction.discrepancy = 0.0;
