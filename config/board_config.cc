@@ -73,6 +73,39 @@ void visit_sim_board(Fields& fields, SimBoardConfig& board) {
   });
 }
 
+void visit_holder(Fields& fields, calibration::HolderOptions& holder) {
+  HolderKind kind = holder.is_there() ? HolderKind::kCharuco : HolderKind::kNone;
+  fields.one_of(
+      {"kind", "none: the camera stands where the rig file has it"}, kind, kHolderKindNames);
+  visit_squares(fields, holder.board, kind == HolderKind::kCharuco);
+  visit_pose(fields, holder.sample_from_board, "board", "sample");
+  holder.board.kind = kind == HolderKind::kCharuco ? calibration::Board::Kind::kCharuco
+                                                   : calibration::Board::Kind::kNone;
+}
+
+void visit_sim_holder(Fields& fields, SimHolderConfig& holder) {
+  sim::HolderScene& scene = holder.scene;
+  fields.one_of({"kind", "none: the sample floats"}, holder.kind, kHolderKindNames);
+  visit_squares(fields, scene.board, holder.is_there());
+  fields.length_mm({"margin", "white around the squares"}, scene.board.margin_mm);
+  fields.number({"glow", "exitance of its front over the irradiance beside the sample"},
+                scene.glow,
+                Range::between(0.0, 1.0));
+  visit_pose(fields, scene.sample_from_board, "board", "sample");
+}
+
+calibration::HolderOptions holder_of(const SimHolderConfig& holder) {
+  calibration::HolderOptions options;
+  if (!holder.is_there()) return options;
+  options.board.kind = calibration::Board::Kind::kCharuco;
+  options.board.squares_x = holder.scene.board.squares_x;
+  options.board.squares_y = holder.scene.board.squares_y;
+  options.board.square_mm = holder.scene.board.square_mm;
+  options.board.marker_mm = holder.scene.board.marker_mm;
+  options.sample_from_board = holder.scene.sample_from_board;
+  return options;
+}
+
 sim::BoardSceneOptions board_scene(const SimBoardConfig& board, const sim::RigOptions& rig) {
   sim::BoardSceneOptions scene;
   scene.board = board.board;

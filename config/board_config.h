@@ -6,13 +6,17 @@
 #include <vector>
 
 #include "calibration/geometry_options.h"
+#include "calibration/placement.h"
 #include "config/fields.h"
 #include "sim/board_scene.h"
+#include "sim/holder_optics.h"
 #include "sim/rig_options.h"
 
 namespace opaline::config {
 
 inline constexpr std::array<std::string_view, 3> kBoardKindNames{"none", "chessboard", "charuco"};
+enum class HolderKind : std::uint8_t { kNone, kCharuco };
+inline constexpr std::array<std::string_view, 2> kHolderKindNames{"none", "charuco"};
 
 /// A board that somebody holds before the simulated station in place of its sample.
 struct SimBoardConfig {
@@ -29,8 +33,19 @@ struct SimBoardConfig {
   bool is_there() const { return kind != calibration::Board::Kind::kNone; }
 };
 
+/// What the simulated sample lies in.
+struct SimHolderConfig {
+  HolderKind kind = HolderKind::kNone;
+  sim::HolderScene scene;
+  bool is_there() const { return kind != HolderKind::kNone; }
+};
+
 void visit_board(Fields& fields, calibration::GeometryOptions& geometry);
 void visit_sim_board(Fields& fields, SimBoardConfig& board);
+void visit_holder(Fields& fields, calibration::HolderOptions& holder);
+void visit_sim_holder(Fields& fields, SimHolderConfig& holder);
+/// A simulated station knows its own.
+calibration::HolderOptions holder_of(const SimHolderConfig& holder);
 
 /// The scene that it describes; with fewer poses than asked for where not all find a place in both pictures.
 sim::BoardSceneOptions board_scene(const SimBoardConfig& board, const sim::RigOptions& rig);

@@ -1,6 +1,9 @@
 #include "config/pose_fields.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <string>
 
 namespace opaline::config {
 namespace {
@@ -19,16 +22,15 @@ bool is_rotation(const std::array<double, 9>& r) {
 
 }  // namespace
 
-void visit_pose(Fields& fields, Pose& pose) {
-  fields.numbers({"rotation", "of the sample's frame into the camera's, 3 x 3, row by row"},
-                 pose.rotation,
-                 Range::between(-1.001, 1.001));
+void visit_pose(Fields& fields, Pose& pose, std::string_view from, std::string_view to) {
+  const std::string turns =
+      fmt::format("of the {}'s frame into the {}'s, 3 x 3, row by row", from, to);
+  const std::string moves =
+      fmt::format("of the same: p_{} = rotation p_{} + translation", to, from);
+  fields.numbers({"rotation", turns}, pose.rotation, Range::between(-1.001, 1.001));
   fields.check(is_rotation(pose.rotation), "rotation", "expected an orthonormal matrix, det +1");
   std::array<double, 3> t{pose.translation.x, pose.translation.y, pose.translation.z};
-  fields.numbers({"translation", "of the same: p_camera = rotation p_sample + translation"},
-                 t,
-                 {},
-                 Unit::kLength);
+  fields.numbers({"translation", moves}, t, {}, Unit::kLength);
   pose.translation = {t[0], t[1], t[2]};
 }
 

@@ -169,6 +169,8 @@ void visit_sim(Fields& fields, SimConfig& sim, bool check_files) {
                [&](Fields& f) { visit_sim_board(f, sim.board); });
   fields.table({"surface", "What the sample's surface reflects, where the lit face is seen."},
                [&](Fields& f) { visit_surface(f, sim.rig.surface); });
+  fields.table({"holder", "What the sample lies in: opal acrylic with a ChArUco board on it."},
+               [&](Fields& f) { visit_sim_holder(f, sim.holder); });
   fields.table({"camera", "What its camera does to the light."},
                [&](Fields& f) { visit_sim_camera(f, sim.rig.camera); });
   fields.table({"projector", "What its projector does with a picture."},
@@ -275,6 +277,9 @@ void visit_calibration(Fields& fields, RigConfig& rig) {
                 kCalibrationUseNames);
   fields.table({"board", "The board that \"opaline calibrate\" measures the lenses with."},
                [&](Fields& f) { visit_board(f, rig.geometry); });
+  fields.table(
+      {"holder", "The board around the sample, by which sessions find it before the camera."},
+      [&](Fields& f) { visit_holder(f, rig.holder); });
   fields.table({"camera", "The camera."}, [&](Fields& f) {
     const capture::CameraCalibration& c = rig.calibration.camera;
     const sim::CameraOptics& real = rig.sim.rig.camera;
@@ -342,6 +347,7 @@ void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
                [&](Fields& f) { visit_sim(f, rig.sim, check_files); });
   if (fields.is_reading()) {
     rig.calibration = truth_of(rig.sim.rig);
+    rig.holder = holder_of(rig.sim.holder);
     rig.sim.lights.clear();
     if (rig.light_stage.driver == StageDriver::kSim) rig.sim.lights = rig.light_stage.lights();
   }

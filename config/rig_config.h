@@ -46,6 +46,7 @@ struct SimConfig {
   sim::RigOptions rig;
   sim::SceneOptions scene;
   SimBoardConfig board;             ///< in place of the scene, if it is there
+  SimHolderConfig holder;           ///< around the sample
   sim::ResponseOptions transport;   ///< its camera_centre follows from the camera's pose
   std::filesystem::path responses;  ///< stored light transport to look at first; empty: none
   std::filesystem::path cache;      ///< for computed light transport; empty: the user's cache
@@ -69,6 +70,8 @@ struct RigConfig {
 
   /// The board that calibration is told of.
   calibration::GeometryOptions geometry;
+  /// By which sessions find the sample before the camera. On a simulated station the truth, unless given.
+  calibration::HolderOptions holder;
 
   bool has_stage() const { return light_stage.driver != StageDriver::kNone; }
   bool is_simulated() const {

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <system_error>
 #include <utility>
 
+#include "calibration/frame_taker.h"
 #include "calibration/procedure.h"
+#include "calibration/sample_finder.h"
 #include "calibration/store.h"
 
 namespace opaline::daemon {
@@ -58,15 +61,17 @@ Result<void> ask_station(const Record& record,
   return ok();
 }
 
-}  // namespace
+bool has_begun(const SessionDirectory& session) {
+  return is_there(session.frames() / "black" / "index.json");
+}
 
-Result<capture::StationCalibration> session_calibration(const SessionDirectory& session,
-                                                        const config::RigConfig& rig,
-                                                        const fs::path& calibrations,
-                                                        const capture::Station& station,
-                                                        FileOperations& files,
-                                                        EventSink& events,
-                                                        std::stop_token stop) {
+Result<capture::StationCalibration> measured_calibration(const SessionDirectory& session,
+                                                         const config::RigConfig& rig,
+                                                         const fs::path& calibrations,
+                                                         const capture::Station& station,
+                                                         FileOperations& files,
+                                                         EventSink& events,
+                                                         std::stop_token stop) {
   const fs::path own = session.calibration();
   if (is_there(own)) {
     const auto text = read_text(own);
@@ -75,8 +80,8 @@ Result<capture::StationCalibration> session_calibration(const SessionDirectory& 
     if (!record) return record.error();
     return calibration::with_measured(rig.calibration, record->measured);
   }
-  const bool begun = is_there(session.frames() / "black" / "index.json");
-  if (begun || rig.calibration_use == config::CalibrationUse::kGiven) return rig.calibration;
+  if (has_begun(session) || rig.calibration_use == config::CalibrationUse::kGiven)
+    return rig.calibration;
   const auto active = calibration::Store(files, calibrations, rig.station).read_active();
   if (!active) return active.error();
   if (!*active) return rig.calibration;
@@ -90,6 +95,105 @@ Result<capture::StationCalibration> session_calibration(const SessionDirectory& 
       {{"version", record.version}, {"created", record.created}, {"message", describe(record)}});
   if (!noted) return noted.error();
   return calibration::with_measured(rig.calibration, record.measured);
+}
+
+/// What the sensor's steps believe, for the one that looks for the holder.
+Result<Record> record_of(const SessionDirectory& session) {
+  if (!is_there(session.calibration())) return Record{};
+  const auto text = read_text(session.calibration());
+  if (!text) return text.error();
+  return calibration::record_from_text(*text, session.calibration().string());
+}
+
+fs::path placement_file(const SessionDirectory& session) {
+  return session.calibration().parent_path() / "placement.json";
+}
+
+Result<calibration::Placement> found_placement(const SessionDirectory& session,
+                                               const config::RigConfig& rig,
+                                               const capture::StationCalibration& calibration,
+                                               const capture::Station& station,
+                                               EventSink& events,
+                                               std::stop_token stop) {
+  auto record = record_of(session);
+  if (!record) return record.error();
+  const auto taker = calibration::FrameTaker::create(station, events);
+  if (!taker) return taker.error();
+  calibration::StepContext context{
+      **taker, calibration, *record, events, std::move(stop), "placement"};
+  return calibration::find_sample(context, calibration.camera.model, rig.holder);
+}
+
+Result<void> note_placement(const calibration::Placement& placement,
+                            const CameraModel& given,
+                            EventSink& events) {
+  CameraModel placed = given;
+  placed.camera_from_sample = placement.camera_from_sample;
+  const double off = length(placed.centre() - given.centre());
+  return events.fact(
+      "placement.measured",
+      {{"corners", placement.corners},
+       {"rms_px", placement.rms_px},
+       {"deviation_mm", placement.deviation_mm},
+       {"from_rig_file_mm", off},
+       {"message",
+        fmt::format(
+            "the sample's place by {} corners of its holder, {:.3f} px left of them, known to "
+            "{:.4f} mm; the camera stands {:.2f} mm from where the rig file has it",
+            placement.corners,
+            placement.rms_px,
+            placement.deviation_mm,
+            off)}});
+}
+
+/// The session's own placement; none where it is to go on without.
+Result<std::optional<calibration::Placement>> own_placement(
+    const SessionDirectory& session,
+    const config::RigConfig& rig,
+    const capture::StationCalibration& calibration,
+    const capture::Station& station,
+    FileOperations& files,
+    EventSink& events,
+    std::stop_token stop) {
+  if (!rig.holder.is_there() || rig.calibration_use == config::CalibrationUse::kGiven)
+    return std::nullopt;
+  const fs::path file = placement_file(session);
+  if (is_there(file)) {
+    const auto text = read_text(file);
+    if (!text) return text.error();
+    const auto kept = calibration::placement_from_text(*text, file.string());
+    if (!kept) return kept.error();
+    return *kept;
+  }
+  if (has_begun(session)) return std::nullopt;
+  const auto found = found_placement(session, rig, calibration, station, events, std::move(stop));
+  if (!found) return found.error().in("placement");
+  if (auto made = files.make_directories(file.parent_path()); !made) return made.error();
+  if (auto kept = write_whole(files, file, to_text(*found)); !kept) return kept.error();
+  if (auto noted = note_placement(*found, calibration.camera.model, events); !noted)
+    return noted.error();
+  return *found;
+}
+
+}  // namespace
+
+Result<capture::StationCalibration> session_calibration(const SessionDirectory& session,
+                                                        const config::RigConfig& rig,
+                                                        const fs::path& calibrations,
+                                                        const capture::Station& station,
+                                                        FileOperations& files,
+                                                        EventSink& events,
+                                                        std::stop_token stop) {
+  auto calibration = measured_calibration(session, rig, calibrations, station, files, events, stop);
+  if (!calibration) return calibration;
+  const auto placement =
+      own_placement(session, rig, *calibration, station, files, events, std::move(stop));
+  if (!placement) return placement.error();
+  if (*placement) {
+    calibration->camera.model.camera_from_sample = (*placement)->camera_from_sample;
+    calibration->camera.place_covariance = (*placement)->covariance;
+  }
+  return calibration;
 }
 
 }  // namespace opaline::daemon

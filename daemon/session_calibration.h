@@ -17,7 +17,11 @@ namespace opaline::daemon {
 /// SESSION/calibration/calibration.json, so that a session that goes on later, or after another calibration, keeps its own.
 /// A session without that file whose capture has begun goes on as it began, by the rig file.
 ///
-/// Facts: calibration.used {version, created, message}, calibration.warning {message} for each doubt.
+/// Where the rig file has a holder, and calibrations are used at all, the camera's place before the sample, with its covariance, is by that
+/// (calibration::find_sample), measured at the same moment and kept in SESSION/calibration/placement.json.
+///
+/// Facts: calibration.used {version, created, message}, calibration.warning {message} for each doubt, placement.measured {corners,
+/// rms_px, deviation_mm, from_rig_file_mm, message}.
 /// Errors: kInvalidArgument, with the remedy, for a calibration that the station contradicts; and what devices and disk return.
 Result<capture::StationCalibration> session_calibration(const SessionDirectory& session,
                                                         const config::RigConfig& rig,

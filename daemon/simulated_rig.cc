@@ -26,6 +26,7 @@ extern "C" {  // glibc 2.36 forgets to say so itself
 #include "daemon/jobs/version.h"
 #include "sim/board_optics.h"
 #include "sim/color_chart.h"
+#include "sim/holder_optics.h"
 #include "sim/led_blob.h"
 #include "sim/rig_client.h"
 #include "sim/rig_message.h"
@@ -174,6 +175,20 @@ Result<std::unique_ptr<sim::Rig>> board_rig(const config::SimBoardConfig& board,
       clock);
 }
 
+Result<std::unique_ptr<sim::Rig>> holder_rig(const sim::HolderScene& holder,
+                                             const sim::RigOptions& options,
+                                             std::shared_ptr<const TransportResponses> responses,
+                                             Clock* clock) {
+  if (auto good = sim::validate(options); !good) return good.error().in("rig");
+  if (auto good = sim::validate(holder); !good) return good.error().in("sim");
+  if (auto good = sim::check_responses(*responses, options.camera.model); !good)
+    return good.error().in("transport responses");
+  return sim::Rig::create(options,
+                          std::make_shared<const sim::HolderOptics>(
+                              options.camera, options.projector, std::move(responses), holder),
+                          clock);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
@@ -204,8 +219,9 @@ Result<std::unique_ptr<sim::Rig>> build_rig(const config::SimConfig& sim,
   auto responses = sim::load_or_compute(
       sim.scene, sim.transport, {sim.responses, sim.cache}, events, std::move(stop));
   if (!responses) return responses.error().in("light transport of the simulated sample");
-  return sim::Rig::create(
-      options, std::make_shared<const TransportResponses>(*std::move(responses)), clock);
+  auto shared = std::make_shared<const TransportResponses>(*std::move(responses));
+  if (sim.holder.is_there()) return holder_rig(sim.holder.scene, options, std::move(shared), clock);
+  return sim::Rig::create(options, std::move(shared), clock);
 }
 
 Result<void> ensure_rig_process(const RigProcess& process, std::stop_token stop) {

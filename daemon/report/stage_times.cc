@@ -17,6 +17,10 @@ void count(const Event& event, SessionFacts& facts) {
   if (event.type == "region.captured") ++facts.regions_captured;
   if (event.type == "region.retaken") ++facts.regions_retaken;
   if (event.type == "calibration.used") facts.calibration = text_in(event, "message");
+  if (event.type == "placement.measured") {
+    if (!facts.calibration.empty()) facts.calibration += "; ";
+    facts.calibration += text_in(event, "message");
+  }
   if (event.type == "calibration.warning")
     facts.calibration_warnings.push_back(text_in(event, "message"));
   if (event.type == "region.unusable") {

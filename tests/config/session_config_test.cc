@@ -10,6 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -49,6 +50,9 @@ TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
                            "led_sphere.toml",
                            "sim-rig-sphere.toml",
                            "sim-boards.toml",
+                           "sim_holder.toml",
+                           "sim-rig-holder.toml",
+                           "sim-rig-holder-boards.toml",
                            "led_blob.toml",
                            "sim-rig-blob.toml",
                            "session.example.toml",
@@ -114,11 +118,22 @@ TEST_F(SessionConfigTest, TakesFromTheQualityWhatIsNotWritten) {
   EXPECT_LT(draft.capture.patterns.regions, standard.capture.patterns.regions);
   EXPECT_GT(reference.capture.patterns.regions, standard.capture.patterns.regions);
   EXPECT_LT(reference.reconstruction.tolerance, standard.reconstruction.tolerance);
+  EXPECT_LT(draft.capture.exposures.planned_snr, standard.capture.exposures.planned_snr);
+  EXPECT_GT(reference.capture.exposures.planned_snr, standard.capture.exposures.planned_snr);
   const SessionConfig mixed =
       load("quality = \"draft\"\n[capture]\nregions = 6\n[reconstruction]\ngrid_step = 1\n");
   EXPECT_EQ(mixed.capture.patterns.regions, 6);
   EXPECT_EQ(mixed.reduction.grid_step, 1.0);
   EXPECT_EQ(mixed.reconstruction.max_iterations, draft.reconstruction.max_iterations);
+}
+
+TEST_F(SessionConfigTest, ASphereOfLightsHasNoSurfaceCellsToPlanExposuresFor) {
+  write("rig.toml", "");
+  EXPECT_THAT(problems_of(write("session.toml",
+                                "rig = \"rig.toml\"\nkind = \"led_sphere\"\n"
+                                "[capture.exposures]\nmode = \"planned\"\n")),
+              Contains(AllOf(HasSubstr("exposures are planned for surface cells"),
+                             HasSubstr("expected capture.exposures.mode = \"bracket\""))));
 }
 
 TEST_F(SessionConfigTest, WritesWhatAQualityStandsForIntoTheResolvedFile) {

@@ -1,0 +1,156 @@
+// A session whose sample lies in a holder, as opaline-capture takes it: the rig file has the camera 1.5 mm and half a degree from where it stands.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "base/event_log.h"
+#include "base/files.h"
+#include "base/io/dataset_io.h"
+#include "base/session_directory.h"
+#include "config/session_config.h"
+#include "sim/optics.h"
+#include "tests/support/named_directory.h"
+#include "tests/support/process.h"
+#include "tests/support/temporary_directory.h"
+
+namespace opaline::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+/// By ruler and protractor.
+std::string believed_camera() {
+  const double angle = 0.5 * std::numbers::pi / 180.0;
+  const Pose turn{
+      {std::cos(angle), 0, std::sin(angle), 0, 1, 0, -std::sin(angle), 0, std::cos(angle)}, {}};
+  const Pose truth = sim::demo_camera_model().camera_from_sample;
+  std::array<double, 9> r{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t k = 0; k < 3; ++k)
+        r[3 * i + j] += truth.rotation[3 * i + k] * turn.rotation[3 * k + j];
+    }
+  }
+  const Vec3 t = truth.translation + Vec3{1.0, -1.0, 0.5};
+  return fmt::format(
+      "\n[calibration.camera]\nrotation = [{}, {}, {}, {}, {}, {}, {}, {}, {}]\n"
+      "translation = [\"{} mm\", \"{} mm\", \"{} mm\"]\n",
+      r[0],
+      r[1],
+      r[2],
+      r[3],
+      r[4],
+      r[5],
+      r[6],
+      r[7],
+      r[8],
+      t.x,
+      t.y,
+      t.z);
+}
+
+class SessionPlacement : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(run_, none_); }
+  void TearDown() override {
+    const fs::path socket = run_ / "opaline" / "rig-holder.sock";
+    if (fs::exists(socket)) call("opaline-rig", {"stop", socket.string()});
+  }
+  struct Said {
+    int status = 0;
+    std::string text;
+  };
+  Said call(const char* program, std::vector<std::string> words) {
+    words.insert(words.begin(),
+                 (opaline::testing::named_directory("OPALINE_BIN_DIR") / program).string());
+    fs::permissions(run_, fs::perms::owner_all);
+    testing::Process process(
+        words,
+        testing::Process::Environment{
+            {"OPALINE_CALIBRATIONS", (directory_.path() / "calibrations").string()},
+            {"XDG_RUNTIME_DIR", run_.string()},
+            {"OPALINE_LOCK_DIR", run_.string()}},
+        directory_.path() / "out");
+    const int status = process.wait();
+    return {status, process.output()};
+  }
+  static std::string replaced(std::string text, const std::string& was, const std::string& is) {
+    const auto found = text.find(was);
+    EXPECT_NE(found, std::string::npos) << was;
+    return text.replace(found, was.size(), is);
+  }
+  /// Captured with what the rig file says in addition.
+  SessionDirectory captured(const std::string& name, const std::string& calibration) {
+    const fs::path source = opaline::testing::named_directory("OPALINE_SOURCE_DIR");
+    const auto text = [&](const char* file) { return read_text(source / "config" / file).value(); };
+    const auto write = [&](const char* file, const std::string& contents) {
+      EXPECT_TRUE(write_whole(system_files(), directory_.path() / file, contents));
+    };
+    write("sim-rig-holder.toml",
+          replaced(text("sim-rig-holder.toml"), "../sim/data", source / "sim" / "data") +
+              calibration);
+    std::string session = replaced(text("sim_holder.toml"), "regions = 4", "regions = 2");
+    session = replaced(session, "held_out_lights = 8", "held_out_lights = 1");
+    write("sim_holder.toml", replaced(session, "mode = \"planned\"", "mode = \"bracket\""));
+    const auto contents = config::read_contents(directory_.path() / "sim_holder.toml");
+    EXPECT_TRUE(contents) << contents.error().message;
+    auto directory = *SessionDirectory::create(system_files(), directory_.path() / name, *contents);
+    const Said said = call("opaline-capture", {directory.path().string()});
+    EXPECT_EQ(said.status, 0) << said.text;
+    return directory;
+  }
+  /// Relative RMS of one's radiance from another's where both tell.
+  static double apart(const SessionDirectory& one, const SessionDirectory& other) {
+    const auto a = read_dataset(one.path());
+    const auto b = read_dataset(other.path());
+    EXPECT_TRUE(a && b);
+    double squares = 0.0;
+    double size = 0.0;
+    for (std::size_t i = 0; i < a->illuminations.size(); ++i) {
+      const Illumination& p = a->illuminations[i];
+      const Illumination& q = b->illuminations[i];
+      for (std::size_t s = 0; s < p.radiance.samples().size(); ++s) {
+        if (p.mask.samples()[s / 3] == 0 || q.mask.samples()[s / 3] == 0) continue;
+        squares += std::pow(p.radiance.samples()[s] - q.radiance.samples()[s], 2);
+        size += std::pow(q.radiance.samples()[s], 2);
+      }
+    }
+    return std::sqrt(squares / size);
+  }
+  static std::string messages_of(const SessionDirectory& session) {
+    std::string text;
+    const auto log = read_events(session.events());
+    if (!log) return log.error().message;
+    for (const Event& event : log->events)
+      text += event.type + ": " + event.data.value("message", "") + "\n";
+    return text;
+  }
+
+  testing::TemporaryDirectory directory_;
+  std::error_code none_;
+  fs::path run_ = directory_.path() / "run";
+};
+
+// The same frames reach the cells by one pose or another, so noise drops out of the comparison. Half a percent is the goal for the relighting error.
+TEST_F(SessionPlacement, TheHolderTellsWhichPixelSeesWhichCellWhateverTheRigFileBelieves) {
+  const auto truth = captured("truth", "\n[calibration]\nuse = \"given\"\n");
+  const auto believed =
+      captured("believed", "\n[calibration]\nuse = \"given\"\n" + believed_camera());
+  const auto placed = captured("placed", believed_camera());
+  EXPECT_THAT(messages_of(placed), HasSubstr("placement.measured: the sample's place by "));
+  EXPECT_TRUE(fs::exists(placed.path() / "calibration" / "placement.json"));
+  EXPECT_FALSE(fs::exists(believed.path() / "calibration" / "placement.json"));
+  EXPECT_GT(apart(believed, truth), 0.05);
+  EXPECT_LT(apart(placed, truth), 0.005);
+  RecordProperty("believed", fmt::format("{}", apart(believed, truth)));
+  RecordProperty("placed", fmt::format("{}", apart(placed, truth)));
+}
+
+}  // namespace
+}  // namespace opaline::daemon
