@@ -183,10 +183,11 @@ Result<std::unique_ptr<sim::Rig>> holder_rig(const sim::HolderScene& holder,
   if (auto good = sim::validate(holder); !good) return good.error().in("sim");
   if (auto good = sim::check_responses(*responses, options.camera.model); !good)
     return good.error().in("transport responses");
-  return sim::Rig::create(options,
-                          std::make_shared<const sim::HolderOptics>(
-                              options.camera, options.projector, std::move(responses), holder),
-                          clock);
+  return sim::Rig::create(
+      options,
+      std::make_shared<const sim::HolderOptics>(
+          options.camera, options.projector, std::move(responses), holder, options.surface),
+      clock);
 }
 
 }  // namespace

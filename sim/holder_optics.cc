@@ -97,8 +97,9 @@ Result<void> validate(const HolderScene& holder) {
 HolderOptics::HolderOptics(const CameraOptics& camera,
                            const ProjectorOptics& projector,
                            std::shared_ptr<const TransportResponses> responses,
-                           const HolderScene& holder)
-    : sample_(camera, projector, responses),
+                           const HolderScene& holder,
+                           const SurfaceOptions& surface)
+    : sample_(camera, projector, responses, surface),
       camera_(camera),
       projector_(projector),
       glow_(holder.glow),

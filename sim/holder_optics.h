@@ -37,7 +37,8 @@ class HolderOptics : public LightPath {
   HolderOptics(const CameraOptics& camera,
                const ProjectorOptics& projector,
                std::shared_ptr<const TransportResponses> responses,
-               const HolderScene& holder);
+               const HolderScene& holder,
+               const SurfaceOptions& surface = {});
 
   StationLight light(const Image<std::uint8_t>& codes) const override;
   StationLight dark() const override { return sample_.dark(); }
