@@ -18,6 +18,8 @@
 #include "capture/lamp_check.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
+#include "capture/stage_view.h"
+#include "capture/stored_frames.h"
 #include "drivers/stage_picture.h"
 
 namespace opaline::capture {
@@ -30,14 +32,14 @@ constexpr const char* kBlackName = "black";
 constexpr const char* kLampFile = "lamps.json";
 constexpr double kHopelessDrift = 10.0;  // over the limit
 
-/// The camera's directions along a row, down a column, and back towards itself.
-std::array<Vec3, 3> axes_of(const CameraModel& camera) {
-  const auto& r = camera.camera_from_sample.rotation;
-  return {Vec3{r[0], r[1], r[2]}, Vec3{r[3], r[4], r[5]}, Vec3{-r[6], -r[7], -r[8]}};
-}
-
 double mean(const Image<float>& picture, int x, int y) {
   return (picture.at(x, y, 0) + picture.at(x, y, 1) + picture.at(x, y, 2)) / 3.0;
+}
+
+StageLight beam_alone(std::size_t lights) {
+  StageLight beam{"beam", std::vector<std::uint8_t>(lights, 0)};
+  beam.codes.back() = 255;
+  return beam;
 }
 
 /// One run over a session directory.
@@ -105,20 +107,7 @@ void GradientSequence::use_black(Frames frames) {
 
 Result<GradientSequence::Frames> GradientSequence::load(const std::string& name,
                                                         const drivers::Pattern& pattern) {
-  auto stored = store_.load(name, pattern);
-  if (!stored) return stored.error();
-  if (!stored->damage.empty()) {
-    log::warning("{}; {} is taken again", stored->damage, name);
-    auto noted =
-        work_.events.fact("region.damaged", {{"region", name}, {"message", stored->damage}});
-    if (!noted) return noted.error();
-  }
-  const CameraModel& model = task_.camera.model;
-  const bool fits = std::ranges::all_of(stored->frames, [&](const CapturedFrame& c) {
-    return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height;
-  });
-  if (!fits) stored->frames.clear();
-  return std::move(stored->frames);
+  return usable_frames(store_, name, pattern, task_.camera.model, work_.events);
 }
 
 Result<RegionTaker*> GradientSequence::taker(std::stop_token stop) {
@@ -258,17 +247,8 @@ Result<void> GradientSequence::judge_drift() {
 Result<void> GradientSequence::finish() {
   taker_.reset();  // dark from here on
   if (auto steady = judge_drift(); !steady) return steady;
-  const CameraModel& camera = task_.camera.model;
-  StageRecord record;
+  StageRecord record = stage_view(task_.camera.model, task_.gradient.object_depth_mm);
   record.lights = lights_;
-  record.axes = axes_of(camera);
-  const Vec3 eye = camera.centre();
-  const double distance = dot(eye, record.axes[2]) - task_.gradient.object_depth_mm;
-  record.middle = eye - record.axes[2] * distance;
-  record.middle_x = camera.cx;
-  record.middle_y = camera.cy;
-  record.pixel_mm = distance / (0.5 * (camera.fx + camera.fy));
-  record.distance_mm = distance;
   record.depolarised = task_.depolarised;
   record.drift = summary_.drift;
   record.split = task_.gradient.patterns.split;
@@ -354,6 +334,7 @@ Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
   auto patterns = stage_patterns(lights_, axes_of(task_.camera.model), task_.gradient.patterns);
   if (!patterns) return patterns.error();
   patterns_ = *std::move(patterns);
+  if (task_.beam) patterns_.insert(patterns_.end() - 1, beam_alone(lights_.size()));
   if (auto noted = work_.events.fact("capture.planned", {{"pictures", patterns_.size()}}); !noted)
     return noted.error();
   for (std::size_t n = 0; n < patterns_.size(); ++n) {
@@ -365,10 +346,13 @@ Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
 }
 
 void GradientSequence::report(const std::string& name, std::optional<nanoseconds> exposure) const {
-  const auto total = static_cast<double>(patterns_.size());
+  const auto total = std::max(1.0, static_cast<double>(patterns_.size()));
   Progress progress{"capture", summary_.pictures / total, std::nullopt, nlohmann::json::object()};
-  progress.detail = {
-      {"light", summary_.pictures + 1}, {"lights", patterns_.size()}, {"region", name}};
+  progress.detail = {{"region", name}};
+  if (!patterns_.empty()) {  // not yet planned while the first black is taken
+    progress.detail["light"] = summary_.pictures + 1;
+    progress.detail["lights"] = patterns_.size();
+  }
   if (exposure) progress.detail["exposure"] = fmt::format("{:.3g} s", seconds(*exposure));
   if (summary_.taken > 0) {
     const double elapsed = seconds(station_.clock.now() - started_) / station_.clock.pace();

@@ -30,6 +30,7 @@ struct GradientTask {
   CameraCalibration camera;  ///< its pose is in the sphere's frame
   std::vector<SphereLight> lights;
   double depolarised = 0.5;  ///< share of depolarised light that passes the crossed polarisers
+  bool beam = false;         ///< the last of `lights` is a thin beam, which is photographed alone
 };
 
 struct GradientSummary {
@@ -40,7 +41,7 @@ struct GradientSummary {
   double drift = 0.0;           ///< relative
 };
 
-/// Captures an object in a sphere of lights, or what is left of it: black, "constant", the gradients, "constant_parallel", "constant_again" (stage_patterns.h), each in
+/// Captures an object in a sphere of lights, or what is left of it: black, "constant", the gradients, "constant_parallel", "beam", "constant_again" (stage_patterns.h), each in
 /// HDR with proof of its pattern (RegionTaker): frames/, hdr/, and at last light_stage.json. The first picture tells where the object is; from
 /// then on only its pixels decide how long to expose. Lamps are taken to drift evenly from the first picture to the last, and the record
 /// says by how much each is brighter. Resumes as capture_session does.

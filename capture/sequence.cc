@@ -20,6 +20,7 @@
 #include "capture/hdr_merge.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
+#include "capture/stored_frames.h"
 #include "capture/surface_map.h"
 
 namespace opaline::capture {
@@ -184,21 +185,7 @@ Result<void> Sequence::check_space() const {
 
 Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,
                                                   const drivers::Pattern& pattern) {
-  auto stored = store_.load(name, pattern);
-  if (!stored) return stored.error();
-  if (!stored->damage.empty()) {
-    log::warning("{}; {} is taken again", stored->damage, name);
-    auto noted =
-        work_.events.fact("region.damaged", {{"region", name}, {"message", stored->damage}});
-    if (!noted) return noted.error();
-  }
-  const CameraModel& model = task_.calibration.camera.model;
-  const bool fits = std::ranges::all_of(stored->frames, [&](const CapturedFrame& c) {
-    return c.frame.pixels.width() == model.width && c.frame.pixels.height() == model.height &&
-           c.frame.pixels.channels() == 3;
-  });
-  if (!fits) stored->frames.clear();
-  return std::move(stored->frames);
+  return usable_frames(store_, name, pattern, task_.calibration.camera.model, work_.events);
 }
 
 Result<void> Sequence::take_black(std::stop_token stop) {

@@ -82,6 +82,19 @@ void visit_udmx(Fields& fields, drivers::UdmxOptions& udmx) {
   fields.duration({"latency", "from the codes to the light"}, udmx.latency, Range::between(0, 5));
 }
 
+void visit_beam(Fields& fields, BeamConfig& beam) {
+  fields.number({"power_w", "of each colour channel, into the object's place; 0: there is no beam"},
+                beam.power_w,
+                Range::between(0, 1000));
+  fields.numbers(
+      {"position_mm", "where it comes from"}, beam.position_mm, Range::between(-1e5, 1e5));
+  fields.numbers(
+      {"aim_mm", "a place of the object that it meets"}, beam.aim_mm, Range::between(-1e5, 1e5));
+  fields.check(!(beam.power_w > 0.0) || beam.position_mm != beam.aim_mm,
+               "aim_mm",
+               "expected another place than position_mm");
+}
+
 }  // namespace
 
 std::vector<SphereLight> LightStageConfig::lights() const {
@@ -96,7 +109,17 @@ std::vector<SphereLight> LightStageConfig::lights() const {
     all[n].intensity = intensities[n];
   for (const std::int64_t dead : dead_lamps)
     if (dead >= 0 && dead < std::ssize(all)) all[static_cast<std::size_t>(dead)].intensity = 0.0;
+  if (has_beam())
+    all.push_back({{beam.position_mm[0], beam.position_mm[1], beam.position_mm[2]}, 0.0});
   return all;
+}
+
+std::optional<sim::LedBeam> sim_beam(const LightStageConfig& stage) {
+  if (!stage.has_beam()) return std::nullopt;
+  const auto point = [](const std::array<double, 3>& v) { return Vec3{v[0], v[1], v[2]}; };
+  return sim::LedBeam{.from = point(stage.beam.position_mm),
+                      .aim = point(stage.beam.aim_mm),
+                      .power_w = stage.beam.power_w};
 }
 
 void visit_light_stage(Fields& fields, LightStageConfig& stage) {
@@ -105,6 +128,8 @@ void visit_light_stage(Fields& fields, LightStageConfig& stage) {
   fields.share({"depolarised", "depolarised light that passes the crossed polarisers"},
                stage.depolarised,
                Range{.min = 0.0, .max = 1.0, .min_excluded = true});
+  fields.table({"beam", "A thin beam on the channel behind the last lamp's: the reference method."},
+               [&](Fields& f) { visit_beam(f, stage.beam); });
   fields.table({"udmx", "DMX over USB."}, [&](Fields& f) { visit_udmx(f, stage.udmx); });
 }
 

@@ -350,6 +350,7 @@ void visit_rig(Fields& fields, RigConfig& rig, bool check_files) {
     rig.holder = holder_of(rig.sim.holder);
     rig.sim.lights.clear();
     if (rig.light_stage.driver == StageDriver::kSim) rig.sim.lights = rig.light_stage.lights();
+    rig.sim.balls.beam = sim_beam(rig.light_stage);
   }
   fields.table({"calibration",
                 "What is known about the devices; of a simulated station the truth, unless given."},

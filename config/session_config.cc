@@ -214,6 +214,7 @@ void visit_led_sphere(Fields& fields, LedSphereOptions& o) {
                 kPatternNames);
   c.patterns.split = pattern == 1;
   fields.flag({"specular", "also a picture with parallel polarisers"}, c.patterns.specular);
+  fields.flag({"beam", "also a picture of the rig's thin beam: the reference method"}, o.beam);
   fields.flag({"check_lamps", "first light each lamp alone, and go on without dead ones"},
               c.check_lamps);
   fields.share({"object_threshold", "of a white surface: what is brighter is the object"},
@@ -240,6 +241,12 @@ void visit_led_sphere(Fields& fields, LedSphereOptions& o) {
       {"largest_window", "pixels on either side"}, o.largest_window, Range::between(2, 1000));
   fields.share({"lamp_deviation", "of each lamp's intensity"}, o.lamp_deviation);
   fields.share({"white_deviation", "of all reflectances"}, o.white_deviation);
+  fields.path({"mesh", "OBJ with texture coordinates, drawn turned; empty: the seen surface"},
+              o.mesh);
+  fields.length_mm({"mesh_size", "its largest extent; 0: its coordinates are mm"},
+                   o.mesh_size_mm,
+                   Range::at_least(0));
+  fields.number({"turn_deg", "of that view, to the right"}, o.turn_deg, Range::between(-180, 180));
 }
 
 /// Before all that the quality sets, so that what is written out has the last word.

@@ -37,6 +37,7 @@ enum class SessionKind : std::uint8_t {
 /// [led_sphere]: how an object in a sphere of lights is captured, and what is asked of its maps.
 struct LedSphereOptions {
   capture::GradientOptions capture;
+  bool beam = true;                ///< the reference method by a thin beam, where the rig has one
   double ior = 1.4;                ///< of the object; 1.3 to 1.5
   double ior_deviation = 0.0;      ///< how far its index may be off; 0: it is known
   int edge_px = 3;                 ///< pixels along the object's outline that are left out: blur
@@ -45,6 +46,10 @@ struct LedSphereOptions {
   int largest_window = 32;         ///< pixels on either side
   double lamp_deviation = 0.01;    ///< relative, of each lamp's intensity, independent
   double white_deviation = 0.005;  ///< relative, of all reflectances
+  std::filesystem::path
+      mesh;  ///< OBJ with texture coordinates that the report draws turned; empty: the seen surface
+  double mesh_size_mm = 0.0;  ///< its largest extent; 0: its coordinates are mm
+  double turn_deg = 35.0;     ///< of that view, to the right
 };
 
 /// A session file with its rig file: all that a session is made from.

@@ -149,6 +149,15 @@ std::string rig_identity(const config::SimConfig& sim) {
   for (const SphereLight& light : sim.lights)
     text += fmt::format(
         "{},{},{},{};", light.position.x, light.position.y, light.position.z, light.intensity);
+  if (const auto& beam = sim.balls.beam)
+    text += fmt::format("{},{},{},{},{},{},{};",
+                        beam->from.x,
+                        beam->from.y,
+                        beam->from.z,
+                        beam->aim.x,
+                        beam->aim.y,
+                        beam->aim.z,
+                        beam->power_w);
   text += version();
   text += sim::transport_key(sim.scene, sim.transport);  // has the algorithm's version
   text += transport_checksum(sim.responses).value_or("");

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "sim/led_beam.h"
 #include "sim/sensor.h"
 
 namespace opaline::sim {
@@ -62,17 +63,19 @@ BlobMaterial LedTruth::material(std::size_t c) const {
 }
 
 std::optional<ObjectTruth> LedTruth::at(const CameraModel& camera, double x, double y) const {
+  return along(camera.centre(), normalized(camera.ray_direction({x, y})));
+}
+
+std::optional<ObjectTruth> LedTruth::along(Vec3 eye, Vec3 way) const {
   ObjectTruth truth;
   if (blob_) {
-    const Vec3 eye = camera.centre();
-    const Vec3 way = normalized(camera.ray_direction({x, y}));
     const auto met = blob_->meets(eye, way);
     if (!met) return std::nullopt;
     truth.point = eye + way * *met;
     truth.normal = blob_->normal(truth.point);
     truth.curvature = blob_->mean_curvature(truth.point);
   } else {
-    const auto seen = see_ball(balls_, camera, x, y);
+    const auto seen = meet_ball(balls_, eye, way);
     if (!seen) return std::nullopt;
     truth.object = seen->ball;
     truth.point = seen->point;
@@ -88,6 +91,8 @@ std::optional<ObjectTruth> LedTruth::at(const CameraModel& camera, double x, dou
   }
   return truth;
 }
+
+LedBlob::~LedBlob() = default;
 
 LedBlob::LedBlob(LedTruth truth, const std::vector<SphereLight>& lights, const CameraOptics& camera)
     : truth_(std::move(truth)),
@@ -151,7 +156,10 @@ Result<std::unique_ptr<const LightPath>> LedBlob::create(const LedSphereOptions&
   if (!truth) return truth.error().in("led sphere");
   if (!truth->blob()) return invalid_argument("led sphere: no body is named");
   std::unique_ptr<LedBlob> made(new LedBlob(*std::move(truth), lights, camera));
-  if (auto traced = made->trace(events, std::move(stop)); !traced) return traced.error();
+  if (auto traced = made->trace(events, stop); !traced) return traced.error();
+  auto beam = BeamLight::trace(options, camera, events, std::move(stop));
+  if (!beam) return beam.error().in("led sphere");
+  made->beam_ = std::make_unique<const BeamLight>(*std::move(beam));
   return std::unique_ptr<const LightPath>(std::move(made));
 }
 
@@ -183,6 +191,8 @@ StationLight LedBlob::light(const Image<std::uint8_t>& codes) const {
       pixel[c] = static_cast<float>(o.depolarised * std::max(0.0, sum) + mirrored);
     }
   }
+  if (o.beam)
+    beam_->add(codes.at(static_cast<int>(lights_.size()) - 1, 0) / 255.0, light.surface_radiance);
   light.sensor_radiance = blurred(light.surface_radiance, psf_sigma_px_);
   return light;
 }

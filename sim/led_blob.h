@@ -29,6 +29,8 @@ class LedTruth {
   /// Errors: kInvalidArgument, kNotFound.
   static Result<LedTruth> create(const LedSphereOptions& options);
   std::optional<ObjectTruth> at(const CameraModel& camera, double x, double y) const;
+  /// Where a unit vector first meets it, from outside.
+  std::optional<ObjectTruth> along(Vec3 from, Vec3 way) const;
   std::size_t objects() const { return balls_.size(); }
   double radius_mm(std::size_t object) const { return balls_[object].radius_mm; }
   const LedSphereOptions& options() const { return options_; }
@@ -53,6 +55,7 @@ class LedBlob : public LightPath {
                                                          const CameraOptics& camera,
                                                          EventSink& events,
                                                          std::stop_token stop);
+  ~LedBlob() override;
   StationLight light(const Image<std::uint8_t>& codes) const override;
   StationLight dark() const override;
   int patches_x() const override { return static_cast<int>(lights_.size()); }
@@ -76,6 +79,7 @@ class LedBlob : public LightPath {
   double psf_sigma_px_;
   double pixel_mm_;
   double path_noise_ = 0.0;
+  std::unique_ptr<const BeamLight> beam_;
 };
 
 /// LedSphere, or LedBlob where the options name a body.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "sim/led_beam.h"
 #include "sim/options_check.h"
 #include "sim/sensor.h"
 
@@ -59,6 +60,10 @@ Result<void> validate(const LedSphereOptions& o, std::size_t lights) {
   check.at_least("paths", static_cast<double>(o.paths), 10'000.0);
   check.at_least("paths_per_pixel", static_cast<double>(o.paths_per_pixel), 16.0);
   check.above("period", o.period_mm, 0.0).above("blur", o.blur_mm, 0.0);
+  if (o.beam) {
+    check.above("beam.power", o.beam->power_w, 0.0);
+    check.at_least("beam.paths", static_cast<double>(o.beam->paths), 1000.0);
+  }
   for (const int dead : o.dead_lights)
     check.within("dead_lights", dead, 0, static_cast<double>(lights) - 1.0);
   return check.result();
@@ -80,8 +85,10 @@ std::optional<SeenBall> see_ball(const std::vector<BallTruth>& balls,
                                  const CameraModel& camera,
                                  double x,
                                  double y) {
-  const Vec3 eye = camera.centre();
-  const Vec3 way = normalized(camera.ray_direction({x, y}));
+  return meet_ball(balls, camera.centre(), normalized(camera.ray_direction({x, y})));
+}
+
+std::optional<SeenBall> meet_ball(const std::vector<BallTruth>& balls, Vec3 eye, Vec3 way) {
   std::optional<SeenBall> seen;
   double nearest = 0.0;
   for (std::size_t b = 0; b < balls.size(); ++b) {
@@ -107,6 +114,8 @@ std::vector<SphereLight> true_lamps(const LedSphereOptions& options,
   for (const int dead : options.dead_lights) lamps[static_cast<std::size_t>(dead)].intensity = 0.0;
   return lamps;
 }
+
+LedSphere::~LedSphere() = default;
 
 LedSphere::LedSphere(const LedSphereOptions& options,
                      const std::vector<SphereLight>& lights,
@@ -172,6 +181,9 @@ Result<std::unique_ptr<const LedSphere>> LedSphere::create(const LedSphereOption
     }
     sphere->tables_.push_back(std::move(table));
   }
+  auto beam = BeamLight::trace(options, camera, events, stop);
+  if (!beam) return beam.error().in("led sphere");
+  sphere->beam_ = std::make_unique<const BeamLight>(*std::move(beam));
   return std::unique_ptr<const LedSphere>(std::move(sphere));
 }
 
@@ -223,6 +235,8 @@ StationLight LedSphere::light(const Image<std::uint8_t>& codes) const {
     float* const pixel = &light.surface_radiance.samples()[3 * std::size_t{seen.pixel}];
     for (std::size_t c = 0; c < 3; ++c) pixel[c] = static_cast<float>(radiance[c] + mirrored);
   }
+  if (options_.beam)
+    beam_->add(codes.at(static_cast<int>(lights_.size()) - 1, 0) / 255.0, light.surface_radiance);
   light.sensor_radiance = blurred(light.surface_radiance, psf_sigma_px_);
   return light;
 }

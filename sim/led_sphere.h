@@ -18,6 +18,14 @@
 
 namespace opaline::sim {
 
+/// A thin beam of light, all channels alike, that shines where the last lamp's code says: that lamp itself stays dark.
+struct LedBeam {
+  Vec3 from;  ///< mm
+  Vec3 aim;
+  double power_w = 0.0;          ///< at full code, of each channel; > 0
+  std::int64_t paths = 400'000;  ///< of each channel; >= 1000
+};
+
 /// Translucent balls side by side in the middle of a sphere of lights: centres on the x axis, in order, `gap_mm` between neighbours, all
 /// together centred on the origin. They neither shade nor light each other.
 struct LedSphereOptions {
@@ -40,6 +48,7 @@ struct LedSphereOptions {
   BlobMixture mixture = BlobMixture::kNone;
   Rgb second_reduced_albedo{0.97, 0.93, 0.9};
   Rgb second_translucency_mm{1.2, 0.9, 0.7};
+  std::optional<LedBeam> beam = std::nullopt;
   double period_mm = 10.0;  ///< of bands, > 0
   double blur_mm = 1.0;     ///< of the step between halves, > 0
 };
@@ -63,11 +72,15 @@ std::optional<SeenBall> see_ball(const std::vector<BallTruth>& balls,
                                  const CameraModel& camera,
                                  double x,
                                  double y);
+/// What is first met along a unit vector.
+std::optional<SeenBall> meet_ball(const std::vector<BallTruth>& balls, Vec3 from, Vec3 way);
 /// The lamps as they truly are: with their errors, and the dead ones dark.
 std::vector<SphereLight> true_lamps(const LedSphereOptions& options,
                                     std::vector<SphereLight> lamps);
 double diffusion_of(double reduced_albedo,
                     double translucency_mm);  ///< D = l_d sqrt(3 (1 - alpha')) / 3, mm
+
+class BeamLight;  // led_beam.h
 
 /// From codes of a light stage (drivers/stage_picture.h) to the camera's pixels. With u and d the direction and distance from a ball's
 /// centre to a light of intensity I at `code`, n a pixel's normal, mu the cosine to the camera, and E, h a traced BallResponse,
@@ -87,6 +100,7 @@ class LedSphere : public LightPath {
                                                          EventSink& events,
                                                          std::stop_token stop);
 
+  ~LedSphere() override;
   StationLight light(const Image<std::uint8_t>& codes) const override;
   StationLight dark() const override;
   int patches_x() const override { return static_cast<int>(lights_.size()); }
@@ -115,6 +129,7 @@ class LedSphere : public LightPath {
   std::vector<BallTruth> balls_;
   std::vector<Table> tables_;  // one a ball
   std::vector<Seen> seen_;
+  std::unique_ptr<const BeamLight> beam_;
   int width_;
   int height_;
   double psf_sigma_px_;

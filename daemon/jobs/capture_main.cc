@@ -38,14 +38,16 @@ Result<void> capture_sphere(const opaline::config::SessionConfig& config,
                             const opaline::capture::Station& station,
                             const opaline::capture::Workplace& workplace,
                             const std::stop_token& stop) {
-  const auto summary = opaline::capture::capture_gradients({config.capture,
-                                                            config.led_sphere.capture,
-                                                            config.rig.calibration.camera,
-                                                            config.rig.light_stage.lights(),
-                                                            config.rig.light_stage.depolarised},
-                                                           station,
-                                                           workplace,
-                                                           stop);
+  const auto summary = opaline::capture::capture_gradients(
+      {config.capture,
+       config.led_sphere.capture,
+       config.rig.calibration.camera,
+       config.rig.light_stage.lights(),
+       config.rig.light_stage.depolarised,
+       config.rig.light_stage.has_beam() && config.led_sphere.beam},
+      station,
+      workplace,
+      stop);
   if (!summary) return summary.error();
   opaline::log::info("capture: {} pictures, {} taken now, {} times taken again, drift {:.2f} %",
                      summary->pictures,

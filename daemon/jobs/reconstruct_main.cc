@@ -10,6 +10,7 @@
 #include "config/session_config.h"
 #include "daemon/jobs/job.h"
 #include "daemon/jobs/version.h"
+#include "daemon/scattering/beam_measurement.h"
 #include "daemon/scattering/sphere_maps.h"
 #include "daemon/scattering/sphere_shell.h"
 #include "daemon/scattering/start_material.h"
@@ -125,7 +126,11 @@ Result<void> reconstruct_sphere(const config::SessionConfig& config, JobContext&
     if (written.error().code != ErrorCode::kInvalidArgument) return written;
     log::warning("no material.vdb: {}", written.error().message);
   }
-  const auto told = maps_summary(*maps, *session, config.led_sphere);
+  auto told = maps_summary(*maps, *session, config.led_sphere);
+  const auto beam =
+      measure_beam(*maps, *session, config.rig.light_stage.beam, config.led_sphere.ior);
+  if (beam && *beam) told["beam"] = to_json(**beam);
+  if (!beam) log::warning("no reference by the beam: {}", beam.error().message);
   return write_whole(job.files, job.session.reconstruction(), told.dump(2) + "\n");
 }
 

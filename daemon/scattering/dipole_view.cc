@@ -5,7 +5,8 @@
 #include <numbers>
 #include <thread>
 
-#include "reconstruct/diffusion/fresnel.h"
+#include "daemon/scattering/turned_view.h"
+#include "reconstruct/spherical_gradient/exit_law.h"
 #include "render/dipole/texture_diffusion.h"
 
 namespace opaline::daemon {
@@ -32,17 +33,6 @@ render::TexelSurface seen_surface(const SphereMaps& maps, const Relief& r) {
       s.covered[at] = 1;
     }
   return s;
-}
-
-/// Radiance over exitance / pi of light that arrives evenly below the surface.
-double leaving(double cosine, double ior) {
-  constexpr int kSteps = 500;
-  double mean = 0.0;
-  for (int n = 0; n < kSteps; ++n) {
-    const double mu = (n + 0.5) / kSteps;
-    mean += 2.0 * mu * (1.0 - reconstruct::diffusion::fresnel_reflectance(mu, ior)) / kSteps;
-  }
-  return (1.0 - reconstruct::diffusion::fresnel_reflectance(std::max(0.05, cosine), ior)) / mean;
 }
 
 /// The light of a pattern over that of the constant one; the picture it is compared with.
@@ -89,6 +79,7 @@ Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
                        Image<float>(relief.width, relief.height, 3),
                        Image<float>(relief.width, relief.height, 3)});
   const double white = white_radiance(session.record);
+  const reconstruct::ExitLaw law(ior);
   for (std::size_t c = 0; c < 3; ++c) {
     const auto known = nearest_maps(relief, maps.channels[c]);
     if (!known) return known.error();
@@ -108,12 +99,21 @@ Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
           const auto at = static_cast<std::size_t>(y * relief.width + x);
           if (surface.covered[at] == 0) continue;
           const int k = static_cast<int>(c);
-          const double law = leaving(surface.normal[at].z, ior);
-          view.rendered.at(x, y, k) = static_cast<float>((*exitance)[at] / std::numbers::pi * law);
+          const double leaving = law.at(surface.normal[at].z);
+          view.rendered.at(x, y, k) =
+              static_cast<float>((*exitance)[at] / std::numbers::pi * leaving);
           view.captured.at(x, y, k) =
               static_cast<float>(seen.at(x * relief.step, y * relief.step, k) / picture_scale);
         }
     }
+  }
+  if (!views.empty()) {
+    auto screen = captured_view_in_screen_space(maps, relief, ior, stop);
+    if (!screen) return screen.error();
+    DipoleView view{"screen_space", views.front().captured, *std::move(screen)};
+    for (std::size_t n = 0; n < view.captured.samples().size(); ++n)
+      if (view.rendered.samples()[n] == 0.0F) view.captured.samples()[n] = 0.0F;  // its outline
+    views.insert(views.begin() + 1, std::move(view));
   }
   for (DipoleView& view : views) compare(view);
   return views;

@@ -5,8 +5,8 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "daemon/scattering/relief.h"
 #include "daemon/scattering/sphere_maps.h"
-#include "daemon/scattering/sphere_shell.h"
 
 namespace opaline::daemon {
 
@@ -20,7 +20,7 @@ struct DipoleView {
   double scale = 0.0;  ///< rendered over captured, in total
 };
 
-/// Under the constant pattern and the shifted gradients. Places without an answer take their nearest; exitance leaves evenly below the surface.
+/// Under the constant pattern, in texture space and ("screen_space") in that of the picture, and under the shifted gradients. Places without an answer take their nearest; exitance leaves evenly below the surface.
 /// Errors: kInvalidArgument where some channel has no answer at all; kCancelled.
 Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
                                              const SphereSession& session,

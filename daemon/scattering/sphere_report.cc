@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,45 +18,19 @@
 #include "daemon/report/plot.h"
 #include "daemon/report/stage_times.h"
 #include "daemon/report/step_progress.h"
+#include "daemon/scattering/beam_measurement.h"
 #include "daemon/scattering/dipole_view.h"
 #include "daemon/scattering/sphere_maps.h"
+#include "daemon/scattering/sphere_plots.h"
+#include "daemon/scattering/sphere_sections.h"
 #include "daemon/scattering/sphere_truth.h"
+#include "daemon/scattering/turned_view.h"
 
 namespace opaline::daemon {
 namespace {
 
 using reconstruct::LeftOut;
 using reconstruct::ScatteringMaps;
-
-constexpr int kReasons = reconstruct::kLastReason + 1;
-constexpr std::array<const char*, 3> kColors{"#c0392b", "#1e8449", "#2471a3"};
-constexpr std::array<std::array<std::uint8_t, 3>, kReasons> kReasonColors{{{255, 255, 255},
-                                                                           {40, 44, 50},
-                                                                           {230, 60, 200},
-                                                                           {90, 150, 230},
-                                                                           {150, 90, 40},
-                                                                           {120, 190, 240},
-                                                                           {240, 160, 60},
-                                                                           {200, 60, 60},
-                                                                           {120, 200, 90},
-                                                                           {220, 200, 70}}};
-
-/// A map's values over what is shown of it.
-struct View {
-  const char* name;
-  const char* title;  ///< with its unit
-  std::vector<float> ScatteringMaps::*values;
-};
-constexpr std::array<View, 4> kViews{
-    View{"diffusion", "Diffusion coefficient D, mm", &ScatteringMaps::diffusion},
-    View{"translucency", "Translucency l_d, mm", &ScatteringMaps::translucency},
-    View{"reduced_albedo", "Reduced albedo α'", &ScatteringMaps::reduced_albedo},
-    View{"diffusion_log_sd", "Deviation of ln D (σ)", &ScatteringMaps::log_diffusion_deviation}};
-
-struct Span {
-  double low = 0.0;
-  double high = 1.0;
-};
 
 class SphereReport {
  public:
@@ -80,17 +54,15 @@ class SphereReport {
   Result<void> write_views();
   Result<void> write_png(const std::string& name, Image<std::uint8_t> picture);
   Result<void> add_maps();
+  std::span<const std::byte> picture_of(const std::string& name) const;
   void add_picture(const std::string& name, std::string_view caption);
   void add_plot(const Result<std::string>& svg, std::string_view caption);
   void add_header(const SessionFacts& facts);
   void add_figures(const SessionFacts& facts);
   Result<void> add_dipole();
-  void add_truth();
-  void add_reasons();
-  void add_assumptions();
-  Result<void> add_histogram();
-  Span span_of(const View& view) const;
-  MapPlot map_plot(const View& view) const;
+  Result<void> add_turned();
+  Result<void> draw_plot(const CurvePlot& plot, const char* name, std::string_view caption);
+  Result<void> add_beam();
   nlohmann::ordered_json results(const SessionFacts& facts) const;
 
   JobContext& job_;
@@ -113,36 +85,14 @@ Result<void> SphereReport::write_png(const std::string& name, Image<std::uint8_t
   return written;
 }
 
-Image<std::uint8_t> normal_picture(const Image<float>& normals) {
-  Image<std::uint8_t> picture(normals.width(), normals.height(), 3);
-  for (std::size_t at = 0; at < normals.pixel_count(); ++at) {
-    const float* n = &normals.samples()[3 * at];
-    if (n[0] == 0.0F && n[1] == 0.0F && n[2] == 0.0F) continue;
-    const std::array<float, 3> shown{n[0], -n[1], n[2]};  // y up, as such pictures are read
-    for (std::size_t k = 0; k < 3; ++k)
-      picture.samples()[3 * at + k] =
-          static_cast<std::uint8_t>(std::lround(127.5F * (1.0F + shown[k])));
-  }
-  return picture;
-}
-
-Image<std::uint8_t> reason_picture(const SphereMaps& maps, const Image<std::uint8_t>& measured) {
-  Image<std::uint8_t> picture(measured.width(), measured.height(), 3);
-  for (std::size_t at = 0; at < measured.pixel_count(); ++at) {
-    if (measured.samples()[at] == reconstruct::kNotSeen) continue;
-    const auto& color = kReasonColors[static_cast<std::size_t>(maps.channels[1].left_out[at])];
-    for (std::size_t k = 0; k < 3; ++k) picture.samples()[3 * at + k] = color[k];
-  }
-  return picture;
-}
-
 Result<void> SphereReport::write_views() {
   const double white = white_radiance(session_.record);
   for (const StagePicture& shown : session_.record.pictures) {
     if (shown.name == "constant_again") continue;
     const Image<float>& radiance = session_.pictures.at(shown.name).radiance;
-    auto written =
-        write_png(shown.name, tone_mapped(radiance, std::min(white, white_point(radiance, 0.998))));
+    const double bright = shown.name == "beam" ? white_point(radiance, 0.99) : white;
+    auto written = write_png(shown.name,
+                             tone_mapped(radiance, std::min(bright, white_point(radiance, 0.998))));
     if (!written) return written;
   }
   if (auto written = write_png("normals", normal_picture(mean_normals(maps_))); !written)
@@ -155,56 +105,15 @@ Result<void> SphereReport::write_views() {
   return write_png("left_out", reason_picture(maps_, session_.measured));
 }
 
-/// From the second to the 98th percentile of all channels.
-Span SphereReport::span_of(const View& view) const {
-  std::vector<float> values;
-  for (const ScatteringMaps& m : maps_.channels)
-    for (std::size_t at = 0; at < m.left_out.size(); ++at)
-      if (m.left_out[at] == LeftOut::kFound) values.push_back((m.*view.values)[at]);
-  if (values.size() < 10) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  const double low = at(0.02);
-  const double high = at(0.98);
-  return {low, high > low ? high : low * 1.01 + 1e-6};
-}
-
-MapPlot SphereReport::map_plot(const View& view) const {
-  constexpr int kMostAcross = 240;
-  const int factor = (maps_.channels[0].width + kMostAcross - 1) / kMostAcross;
-  MapPlot plot;
-  plot.columns = 3;
-  plot.panel_width = 240;
-  plot.panel_height = 240 * maps_.channels[0].height / maps_.channels[0].width;
-  plot.scale_label = view.title;
-  const Span span = span_of(view);
-  const double margin = 0.002 * (span.high - span.low);  // what is rounded must not fall out
-  plot.lowest = span.low - margin;
-  plot.highest = span.high + margin;
-  const double pixel = session_.record.pixel_mm * factor;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const ScatteringMaps& m = maps_.channels[c];
-    Image<float> panel(m.width / factor, m.height / factor, 1);
-    for (int y = 0; y < panel.height(); ++y)
-      for (int x = 0; x < panel.width(); ++x) {
-        const std::size_t at =
-            static_cast<std::size_t>(y) * factor * m.width + static_cast<std::size_t>(x) * factor;
-        panel.at(x, panel.height() - 1 - y) = m.left_out[at] == LeftOut::kFound
-                                                  ? std::clamp((m.*view.values)[at],
-                                                               static_cast<float>(span.low),
-                                                               static_cast<float>(span.high))
-                                                  : std::numeric_limits<float>::quiet_NaN();
-      }
-    plot.panels.push_back({kChannelNames[c], std::move(panel), pixel, pixel, "mm", "mm"});
-  }
-  return plot;
+/// Empty where none was made.
+std::span<const std::byte> SphereReport::picture_of(const std::string& name) const {
+  for (const auto& [known, png] : pngs_)
+    if (known == name) return png;
+  return {};
 }
 
 void SphereReport::add_picture(const std::string& name, std::string_view caption) {
-  for (const auto& [known, png] : pngs_)
-    if (known == name) body_ += html::picture(png, caption);
+  if (const auto png = picture_of(name); !png.empty()) body_ += html::picture(png, caption);
 }
 
 void SphereReport::add_plot(const Result<std::string>& svg, std::string_view caption) {
@@ -219,43 +128,54 @@ Result<void> SphereReport::add_maps() {
       "White where a pixel has no answer; why, see below. maps.exr has every value with its unit, "
       "absorption and reduced scattering too.");
   double done = 0.0;
-  for (const View& view : kViews) {
-    const auto svg = draw(map_plot(view), view.name, job_.stop);
+  for (const MapView& view : kMapViews) {
+    const auto svg = draw(map_plot(maps_, session_.record.pixel_mm, view), view.name, job_.stop);
     if (!svg && svg.error().code == ErrorCode::kCancelled) return svg.error();
     add_plot(svg, view.title);
-    progress.done(++done / (kViews.size() + 1.0));
+    progress.done(++done / (kMapViews.size() + 1.0));
   }
-  if (auto drawn = add_histogram(); !drawn) return drawn;
+  if (auto drawn = draw_plot(
+          diffusion_histogram(maps_),
+          "histogram",
+          "How often each D was found. One material makes one peak; its width is the noise.");
+      !drawn)
+    return drawn;
   body_ += "</section>\n";
   return ok();
 }
 
-Result<void> SphereReport::add_histogram() {
-  constexpr int kBins = 60;
-  const Span span = span_of(kViews[0]);
-  CurvePlot plot;
-  plot.x_label = "D, mm";
-  plot.y_label = "share of pixels, %";
-  for (std::size_t c = 0; c < 3; ++c) {
-    const ScatteringMaps& m = maps_.channels[c];
-    Series series{std::string(kChannelNames[c]), kColors[c], {}, std::vector<double>(kBins, 0.0)};
-    double count = 0.0;
-    for (std::size_t at = 0; at < m.left_out.size(); ++at) {
-      if (m.left_out[at] != LeftOut::kFound) continue;
-      const double share = (m.diffusion[at] - span.low) / (span.high - span.low);
-      count += 1.0;
-      if (share >= 0.0 && share < 1.0) series.y[static_cast<std::size_t>(share * kBins)] += 100.0;
-    }
-    for (int bin = 0; bin < kBins; ++bin) {
-      series.x.push_back(span.low + (bin + 0.5) / kBins * (span.high - span.low));
-      series.y[static_cast<std::size_t>(bin)] /= std::max(1.0, count);
-    }
-    series.style = SeriesStyle::kSteps;
-    plot.series.push_back(std::move(series));
-  }
-  const auto svg = draw(plot, "histogram", job_.stop);
+Result<void> SphereReport::draw_plot(const CurvePlot& plot,
+                                     const char* name,
+                                     std::string_view caption) {
+  const auto svg = draw(plot, name, job_.stop);
   if (!svg && svg.error().code == ErrorCode::kCancelled) return svg.error();
-  add_plot(svg, "How often each D was found. One material makes one peak; its width is the noise.");
+  add_plot(svg, caption);
+  return ok();
+}
+
+/// The reference method beside the maps.
+Result<void> SphereReport::add_beam() {
+  const auto measured =
+      measure_beam(maps_, session_, config_.rig.light_stage.beam, config_.led_sphere.ior);
+  if (measured && !*measured) return ok();
+  body_ += "<section id=\"beam\">\n<h2>A thin beam, for reference</h2>\n";
+  if (!measured) {
+    body_ +=
+        html::warning(fmt::format("Not measured: {}", measured.error().message)) + "</section>\n";
+    return ok();
+  }
+  const BeamMeasurement& beam = **measured;
+  body_ += html::paragraph(
+      "The usual way to scattering parameters: a dipole fitted to the light around a thin beam. It "
+      "takes the surface for flat, so on a curved object its l_d is too long.");
+  add_picture("beam", "the beam alone, its own scale");
+  if (auto drawn = draw_plot(beam_plot(beam, config_.led_sphere.ior),
+                             "beam_profile",
+                             "Points: rings around the beam. Lines: the dipoles fitted to them.");
+      !drawn)
+    return drawn;
+  body_ += beam_table(beam, truth_ ? &config_.rig.sim.balls : nullptr);
+  body_ += "</section>\n";
   return ok();
 }
 
@@ -265,16 +185,18 @@ void SphereReport::add_header(const SessionFacts& facts) {
       html::escaped(config_.sample_name),
       html::escaped(job_.session.id()),
       html::escaped(config_.rig.station),
-      session_.record.lights.size(),
+      session_.record.lights.size() - (config_.rig.light_stage.has_beam() ? 1 : 0),
       html::escaped(facts.begun.substr(0, 16)));
   for (const auto& [id, title] : {std::pair{"pictures", "Pictures"},
                                   {"maps", "Maps"},
+                                  {"beam", "Beam"},
                                   {"dipole", "Rendered"},
                                   {"left-out", "Left out"},
                                   {"truth", "Truth"},
                                   {"assumptions", "Assumptions"},
                                   {"settings", "Settings"}})
-    if (truth_ || std::string_view(id) != "truth")
+    if ((truth_ || std::string_view(id) != "truth") &&
+        (session_.pictures.contains("beam") || std::string_view(id) != "beam"))
       body_ += fmt::format("<a href=\"#{}\">{}</a>", id, title);
   body_ += "</nav></header>\n";
 }
@@ -309,6 +231,38 @@ void SphereReport::add_figures(const SessionFacts& facts) {
   body_ += "</div>\n";
 }
 
+/// A view that was not captured, and the captured one by the same means.
+Result<void> SphereReport::add_turned() {
+  const config::LedSphereOptions& o = config_.led_sphere;
+  const auto turned =
+      turned_view(maps_, session_, {o.mesh, o.mesh_size_mm, o.turn_deg}, o.ior, job_.stop);
+  if (!turned && turned.error().code == ErrorCode::kCancelled) return turned.error();
+  if (!turned) {
+    body_ +=
+        html::warning(fmt::format("No other view: {}", turned.error().message)) + "</section>\n";
+    return ok();
+  }
+  Image<float> both(2 * turned->even.width(), turned->even.height(), 3);
+  for (int y = 0; y < both.height(); ++y)
+    for (int x = 0; x < both.width(); ++x)
+      for (int c = 0; c < 3; ++c) {
+        const int half = turned->even.width();
+        both.at(x, y, c) =
+            x < half ? turned->even.at(x, y, c) : turned->from_left.at(x - half, y, c);
+      }
+  if (auto written =
+          write_png("dipole_turned", tone_mapped(both, white_point(turned->even, 0.998)));
+      !written)
+    return written;
+  add_picture("dipole_turned",
+              fmt::format("{}, turned by {:.4g}° and drawn by screen-space diffusion: even light; "
+                          "light from the left",
+                          o.mesh.empty() ? "The seen surface" : o.mesh.filename().string(),
+                          o.turn_deg));
+  body_ += "</section>\n";
+  return ok();
+}
+
 /// What the maps make of the captured view, beside it.
 Result<void> SphereReport::add_dipole() {
   const auto views = dipole_views(maps_, session_, config_.led_sphere.ior, job_.stop);
@@ -336,89 +290,7 @@ Result<void> SphereReport::add_dipole() {
                             100.0 * (view.scale - 1.0)));
     dipole_errors_.emplace_back(view.name, view.error);
   }
-  body_ += "</section>\n";
-  return ok();
-}
-
-void SphereReport::add_truth() {
-  if (!truth_) return;
-  std::vector<std::vector<std::string>> rows;
-  for (const BallErrors& ball : truth_->balls)
-    rows.push_back(
-        {fmt::format("{:.3g} mm, {}",
-                     ball.radius_mm,
-                     kChannelNames[static_cast<std::size_t>(ball.channel)]),
-         fmt::format("{:.4f}", ball.diffusion_mm),
-         ball.found > 0 ? fmt::format("{:.4f}", ball.median_diffusion) : "–",
-         ball.found > 0
-             ? fmt::format("{:+.1f} %", 100.0 * (ball.median_diffusion / ball.diffusion_mm - 1.0))
-             : "–",
-         fmt::format("{:.4f}", ball.reduced_albedo),
-         ball.found > 0 ? fmt::format("{:.4f}", ball.median_albedo) : "–",
-         ball.found > 0 ? fmt::format("{:.0f} %", 100.0 * ball.within_two_sigma) : "–",
-         fmt::format("{:.0f} %", 100.0 * ball.found / std::max(1, ball.seen))});
-  body_ += html::section(
-      "truth",
-      "Against the simulated truth",
-      html::paragraph(fmt::format("Medians over each ball's pixels that have an answer. Mean error "
-                                  "of the normals: {:.2f}°.",
-                                  truth_->mean_normal_error_deg)) +
-          html::table({"ball", "D, mm", "found", "off by", "α'", "found", "within 2 σ", "answered"},
-                      rows));
-}
-
-void SphereReport::add_reasons() {
-  body_ += "<section id=\"left-out\">\n<h2>Left out, and why</h2>\n";
-  add_picture("left_out", "Green: white has an answer, other colours as in the table.");
-  static constexpr std::array<const char*, kReasons> kNames{"white",
-                                                            "dark grey",
-                                                            "magenta",
-                                                            "blue",
-                                                            "brown",
-                                                            "light blue",
-                                                            "orange",
-                                                            "red",
-                                                            "green",
-                                                            "yellow"};
-  std::vector<std::vector<std::string>> rows;
-  for (int reason = 0; reason < kReasons; ++reason) {
-    std::vector<std::string> row{fmt::format("{} ({})",
-                                             reconstruct::to_string(static_cast<LeftOut>(reason)),
-                                             kNames[static_cast<std::size_t>(reason)])};
-    for (const ScatteringMaps& m : maps_.channels) {
-      int count = 0;
-      for (std::size_t at = 0; at < m.left_out.size(); ++at)
-        if (session_.measured.samples()[at] != reconstruct::kNotSeen &&
-            static_cast<int>(m.left_out[at]) == reason)
-          ++count;
-      row.push_back(fmt::format("{}", count));
-    }
-    rows.push_back(std::move(row));
-  }
-  body_ += html::table({"pixels", "red", "green", "blue"}, rows);
-  body_ += "</section>\n";
-}
-
-void SphereReport::add_assumptions() {
-  const config::LedSphereOptions& o = config_.led_sphere;
-  body_ += html::section(
-      "assumptions",
-      "What was assumed",
-      html::facts(
-          {{"Refractive index",
-            o.ior_deviation > 0.0 ? fmt::format("{} ± {}", o.ior, o.ior_deviation)
-                                  : fmt::format("{}, known", o.ior)},
-           {"Scattering", "isotropic (reduced coefficients), alike to some l_d around each pixel"},
-           {"Shape", "as curved as a ball of its mean curvature; convex, nothing shades it"},
-           {"Lamps", fmt::format("each known to {:.2g} %", 100.0 * o.lamp_deviation)},
-           {"White", fmt::format("known to {:.2g} %", 100.0 * o.white_deviation)},
-           {"Drift of the lamps",
-            fmt::format("{:+.2f} % over the capture, evenly", 100.0 * session_.record.drift)},
-           {"Estimator", "table of traced balls (reconstruct/spherical_gradient/ball_table.h)"}}));
-  body_ +=
-      "<section id=\"settings\">\n<h2>Settings</h2>\n<details><summary>Every setting, with the "
-      "defaults filled in</summary>\n<pre>" +
-      html::escaped(config::to_toml(config_)) + "</pre></details>\n</section>\n";
+  return add_turned();
 }
 
 nlohmann::ordered_json SphereReport::results(const SessionFacts& facts) const {
@@ -462,10 +334,11 @@ Result<void> SphereReport::run() {
     if (shown.name.starts_with("gradient")) add_picture(shown.name, shown.name);
   body_ += "</div>\n</section>\n";
   if (auto drawn = add_maps(); !drawn) return drawn;
+  if (auto drawn = add_beam(); !drawn) return drawn;
   if (auto drawn = add_dipole(); !drawn) return drawn;
-  add_reasons();
-  add_truth();
-  add_assumptions();
+  body_ += reasons_section(maps_, session_, picture_of("left_out"));
+  if (truth_) body_ += truth_section(*truth_);
+  body_ += assumptions_section(config_, session_);
   body_ += fmt::format("<footer>opaline-preview {}</footer>\n", version());
   if (auto written = write_whole(job_.files, job_.session.results(), results(facts).dump(2) + "\n");
       !written)

@@ -51,7 +51,7 @@ Image<std::uint8_t> measured_in(const SphereSession& session,
   Image<std::uint8_t> measured =
       eroded(object_of(session.pictures.at("constant"), threshold), options.edge_px);
   for (const auto& [name, picture] : session.pictures) {
-    if (name == "constant_parallel") continue;
+    if (name == "constant_parallel" || name == "beam") continue;
     for (int y = 0; y < measured.height(); ++y)
       for (int x = 0; x < measured.width(); ++x) {
         std::uint8_t& pixel = measured.at(x, y);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "base/io/stage_record_io.h"
 #include "capture/stage_projector.h"
 #include "sim/sim_camera.h"
@@ -75,6 +77,27 @@ TEST_F(GradientSequenceTest, TakesEveryPictureAndRecordsWhatItWas) {
   EXPECT_NEAR(record->axes[1].y, -1.0, 1e-9);  // down the picture
   EXPECT_EQ(record->pictures[1].name, "gradient_x");
   EXPECT_EQ(results().size(), 6U);
+}
+
+TEST_F(GradientSequenceTest, ABeamIsPhotographedAloneAndInNoPattern) {
+  tiny_.lights.push_back({{0.0, 0.0, 500.0}, 0.0});
+  tiny_.rig.projector.width = static_cast<int>(tiny_.lights.size()) + 1;
+  tiny_.sphere.beam = sim::LedBeam{{0.0, 0.0, 500.0}, {0.0, 0.0, 8.0}, 0.002, 20'000};
+  traced_ = tiny_.path();
+  GradientTask with_beam = task();
+  with_beam.beam = true;
+  const auto done = capture(with_beam);
+  ASSERT_TRUE(done) << done.error().message;
+  const auto record = read_stage_record(directory_.path());
+  ASSERT_TRUE(record) << record.error().message;
+  for (const StagePicture& picture : record->pictures) {
+    const bool alone = picture.name == "beam";
+    EXPECT_EQ(picture.codes.back(), alone ? 255 : 0) << picture.name;
+    EXPECT_EQ(std::ranges::count(picture.codes, 0) == std::ssize(picture.codes) - 1, alone);
+  }
+  ASSERT_NE(record->find("beam"), nullptr);
+  EXPECT_EQ(record->pictures.back().name, "constant_again");
+  EXPECT_TRUE(std::filesystem::exists(directory_.path() / "hdr" / "beam.exr"));
 }
 
 TEST_F(GradientSequenceTest, GoesOnWhereItWasStoppedWithTheSameResult) {
