@@ -1,6 +1,7 @@
 #include "daemon/light_switch.h"
 
 #include <memory>
+#include <utility>
 
 #include "drivers/udmx/udmx_stage.h"
 #include "sim/rig_client.h"
@@ -20,11 +21,12 @@ Result<void> make_dark(const std::filesystem::path& socket) {
 
 }  // namespace
 
-std::function<Result<void>()> light_switch(const config::RigConfig& rig) {
+std::function<Result<void>()> light_switch(const config::RigConfig& rig,
+                                           std::function<std::unique_ptr<drivers::UdmxBus>()> bus) {
   if (rig.light_stage.driver == config::StageDriver::kUdmx) {
     drivers::UdmxOptions options = rig.light_stage.udmx;
     options.lights = rig.light_stage.lights();
-    return [options] { return drivers::UdmxStage(options, drivers::make_usb_bus()).blank(); };
+    return [options, bus = std::move(bus)] { return drivers::UdmxStage(options, bus()).blank(); };
   }
   const bool simulated = rig.has_stage() || rig.projector == config::Driver::kSim;
   const bool outlives_job = simulated && rig.sim.run == config::RigPlace::kProcess;
