@@ -57,8 +57,8 @@ function show(v) {
   at('answers').hidden = !v.board;
   if (v.board) {
     at('cornerslabel').textContent = 'pose ' + v.board.pose + ' of ' + v.board.poses;
-    at('corners').textContent = v.board.fault || v.board.corners + ' corners, so far in ' +
-        (100 * v.board.coverage).toFixed(0) + ' % of the picture';
+    at('corners').textContent = v.board.fault || v.board.corners + ' corners, blurred by ' + v.board.blur_px.toFixed(2) +
+        ' px, so far in ' + (100 * v.board.coverage).toFixed(0) + ' % of the picture';
     at('next').textContent = 'Next: the board ' + v.board.next;
   }
 }
