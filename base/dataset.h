@@ -23,6 +23,8 @@ struct Illumination {
   Image<float> radiance_variance;  ///< of the measurement, same shape; > 0 where the mask is set
   Image<std::uint8_t>
       mask;  ///< 1 channel: 1 = usable, 0 = saturated, dark, outside, or lit directly
+  /// Of radiance_variance, summed: what an inexact calibration adds to the pictures' own noise; 0 to 1.
+  double calibration_share = 0.0;
 };
 
 /// What was measured, where on the sample, with which variance and mask: all that the

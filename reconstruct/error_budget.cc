@@ -14,6 +14,7 @@ constexpr std::size_t kMostLights = 4;
 struct Sums {
   double misfit = 0.0;
   double noise = 0.0;
+  double calibration = 0.0;
   double power = 0.0;
 
   void add(const Illumination& measured, const Image<float>& predicted) {
@@ -21,7 +22,9 @@ struct Sums {
       if (measured.mask.samples()[s / kColorChannels] == 0) continue;
       const double l = measured.radiance.samples()[s];
       misfit += std::pow(predicted.samples()[s] - l, 2);
-      noise += measured.radiance_variance.samples()[s];
+      const double variance = measured.radiance_variance.samples()[s];
+      noise += (1.0 - measured.calibration_share) * variance;
+      calibration += measured.calibration_share * variance;
       power += l * l;
     }
   }
@@ -98,8 +101,8 @@ Dataset some_held_out(Dataset dataset) {
 }  // namespace
 
 double ErrorBudget::sum() const {
-  return std::sqrt(noise * noise + model * model + discretisation * discretisation +
-                   undetermined * undetermined);
+  return std::sqrt(noise * noise + calibration * calibration + model * model +
+                   discretisation * discretisation + undetermined * undetermined);
 }
 
 std::optional<ErrorBudget> error_budget(const Dataset& dataset,
@@ -117,8 +120,10 @@ std::optional<ErrorBudget> error_budget(const Dataset& dataset,
   ErrorBudget budget;
   budget.measured = std::sqrt(held_out.misfit / held_out.power);
   budget.noise = std::sqrt(held_out.noise / held_out.power);
+  budget.calibration = std::sqrt(held_out.calibration / held_out.power);
   budget.discretisation = discretisation;
-  budget.model = root_of_excess((fitted.misfit - fitted.noise) / fitted.power, discretisation);
+  budget.model = root_of_excess((fitted.misfit - fitted.noise - fitted.calibration) / fitted.power,
+                                discretisation);
   budget.undetermined = std::sqrt(held_out_variance / held_out.power);
   return budget;
 }

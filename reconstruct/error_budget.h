@@ -18,6 +18,8 @@ namespace opaline::reconstruct {
 struct ErrorBudget {
   double measured = 0.0;  ///< ||L - L*|| / ||L*||, to be explained
   double noise = 0.0;     ///< of the held-out pictures, as measured
+  double calibration =
+      0.0;  ///< what an inexact calibration adds to it (Illumination::calibration_share)
   /// What the pictures of the fit keep beyond their noise and the grid's error: what no material of the model explains.
   double model = 0.0;
   double discretisation = 0.0;  ///< discretisation_error()

@@ -164,6 +164,7 @@ Json to_json(const DeviationByDepth& d) {
 Json to_json(const ErrorBudget& b) {
   return {{"measured", b.measured},
           {"noise", b.noise},
+          {"calibration", b.calibration},
           {"model", b.model},
           {"discretisation", b.discretisation},
           {"undetermined", b.undetermined},

@@ -73,7 +73,7 @@ Result<std::optional<UncertaintyResult>> material_uncertainty(const Dataset& dat
 ///   channels [{channel, determined_diffusion, determined_absorption, solves, seconds,
 ///              absorption, reduced_scattering, diffusion {prior, amplitude, layers [..]}}]
 ///
-///   error_budget {measured, noise, model, discretisation, undetermined, sum}   where lights were held out
+///   error_budget {measured, noise, calibration, model, discretisation, undetermined, sum}   where lights were held out
 ///
 /// deviations of natural logarithms, layers from the seen face inwards.
 nlohmann::ordered_json to_json(const UncertaintyResult& uncertainty);

@@ -161,8 +161,11 @@ Result<std::string> write_image(FileOperations& files,
 
 json describe(const Dataset& set) {
   json lights = json::array();
-  for (const Illumination* light : lights_of(set))
+  for (const Illumination* light : lights_of(set)) {
     lights.push_back({{"name", light->name}, {"held_out", light->held_out}});
+    if (light->calibration_share > 0.0)
+      lights.back()["calibration_share"] = light->calibration_share;
+  }
   if (set.uniform) lights.back()["uniform"] = true;
   return {{"format", kDatasetFormat},
           {"cells", set.block.cells()},
@@ -213,6 +216,7 @@ Result<Dataset> header_from(const json& sidecar) {
     Illumination& added = set.illuminations.emplace_back();
     added.name = light.at("name").get<std::string>();
     added.held_out = light.at("held_out").get<bool>();
+    added.calibration_share = std::clamp(light.value("calibration_share", 0.0), 0.0, 1.0);
   }
   if (!set.illuminations.empty() && sidecar.at("illuminations").back().value("uniform", false)) {
     set.uniform = std::move(set.illuminations.back());

@@ -123,6 +123,7 @@ std::string budget_of(const json& reconstruction) {
   std::vector<Row> rows;
   for (const auto& [key, meaning] :
        {std::pair{"noise", "noise of the held-out pictures"},
+        {"calibration", "calibration: what an inexact place of the camera adds to the pictures"},
         {"model",
          "model: what no material explains in the pictures of the fit, beyond noise and grid"},
         {"discretisation", "discretisation: what a grid twice as fine changes, extrapolated"},
@@ -132,8 +133,11 @@ std::string budget_of(const json& reconstruction) {
     rows.push_back({meaning, fmt::format("{:.2f} %", 100.0 * budget.value(key, 0.0))});
   return html::paragraph(
              "The relighting error of the held-out lights on the sample's surface, and what it is "
-             "made of. Calibration is not in it: the pictures of the fit and the held-out ones "
-             "share it, so it shows in the coefficients and not here.") +
+             "made of. An inexact calibration is shared by the pictures of the fit and the "
+             "held-out "
+             "ones: what it adds is the most that it can, and what it does to all of them alike, "
+             "as "
+             "a wrong scale would, shows in the coefficients and not here.") +
          html::table({"part", "relative error"}, rows);
 }
 

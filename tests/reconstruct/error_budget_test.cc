@@ -48,6 +48,21 @@ TEST(ErrorBudget, TellsNoiseFromWhatTheFitKeepsBeyondIt) {
               1e-12);
 }
 
+// Three quarters of the variance: half the noise, and the root of three quarters of it.
+TEST(ErrorBudget, TellsCalibrationFromNoise) {
+  std::mt19937 random(4);
+  Dataset dataset;
+  dataset.illuminations = {picture(false, 0.0, 0.04, random), picture(true, 0.0, 0.04, random)};
+  const std::vector<Image<float>> predicted(2, Image<float>(40, 40, kColorChannels, 2.0F));
+  const auto whole = error_budget(dataset, predicted, 0.0, 0.0);
+  for (Illumination& i : dataset.illuminations) i.calibration_share = 0.75;
+  const auto parted = error_budget(dataset, predicted, 0.0, 0.0);
+  EXPECT_EQ(whole->calibration, 0.0);
+  EXPECT_NEAR(parted->noise, 0.5 * whole->noise, 1e-9);
+  EXPECT_NEAR(parted->calibration, std::sqrt(0.75) * whole->noise, 1e-9);
+  EXPECT_NEAR(parted->sum(), whole->sum(), 1e-9);
+}
+
 TEST(ErrorBudget, CountsNoModelErrorWhereTheFitIsWithinItsNoise) {
   std::mt19937 random(4);
   Dataset dataset;

@@ -34,6 +34,7 @@ Dataset example() {
     Illumination& light = set.illuminations.emplace_back();
     light.name = held_out ? "held_out_0" : "region_0_0";
     light.held_out = held_out;
+    light.calibration_share = held_out ? 0.25 : 0.0;
     light.irradiance = raster<float>(4, 3, 3, held_out ? 2.0 : 1.0);
     light.radiance = raster<float>(5, 4, 3, held_out ? 4.0 : 3.0);
     light.radiance_variance = raster<float>(5, 4, 3, 5.0);
@@ -56,6 +57,7 @@ void expect_equal(const Dataset& a, const Dataset& b) {
     const Illumination& q = b.illuminations[i];
     EXPECT_EQ(p.name, q.name);
     EXPECT_EQ(p.held_out, q.held_out);
+    EXPECT_EQ(p.calibration_share, q.calibration_share);
     EXPECT_EQ(p.irradiance, q.irradiance);
     EXPECT_EQ(p.radiance, q.radiance);
     EXPECT_EQ(p.radiance_variance, q.radiance_variance);
