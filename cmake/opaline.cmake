@@ -26,6 +26,9 @@ if(OPALINE_WERROR)
 else()  # at -O3 and in instrumented code g++ 12 sees ghosts
   target_compile_options(opaline_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
 endif()
+if(OPALINE_UNITY)  # of one source they say what is meant for another, or for headers
+  target_compile_options(opaline_options INTERFACE -Wno-shadow -Wno-subobject-linkage)
+endif()
 if(OPALINE_SANITIZE)
   target_compile_options(opaline_options INTERFACE -fsanitize=${OPALINE_SANITIZE}
     -fno-omit-frame-pointer -fno-sanitize-recover=all)
