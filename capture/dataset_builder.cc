@@ -27,7 +27,8 @@ Illumination illumination_of(const Light& light,
                         light.irradiance,
                         surface.radiance,
                         surface.variance,
-                        surface.mask};
+                        surface.mask,
+                        surface.place_share};
   if (!usable) std::ranges::fill(measured.mask.samples(), std::uint8_t{0});
   if (sample.lit_face == sample.seen_face && !light.uniform) {
     mask_direct_light(sample.block, sample.lit_face, light.irradiance, margin_mm, measured.mask);

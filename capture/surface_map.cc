@@ -131,6 +131,13 @@ double slope_between(const SurfaceRadiance& s,
   return (s.radiance.at(to[0], to[1], c) - s.radiance.at(from[0], from[1], c)) / steps;
 }
 
+double usable_variance(const SurfaceRadiance& s) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < s.variance.samples().size(); ++i)
+    if (s.mask.samples()[i / 3] != 0) sum += s.variance.samples()[i];
+  return sum;
+}
+
 Error sees_nothing(Face face) {
   return invalid_argument(
       fmt::format("the camera sees nothing of face {}: is its pose right?", to_string(face)));
@@ -234,7 +241,10 @@ SurfaceRadiance SurfaceMap::apply(const HdrImage& hdr, double min_coverage) cons
       }
     }
   }
+  const double own = usable_variance(surface);
   add_place_variance(surface);
+  const double all = usable_variance(surface);
+  surface.place_share = all > 0.0 ? 1.0 - own / all : 0.0;
   return surface;
 }
 

@@ -18,6 +18,8 @@ struct SurfaceRadiance {
   Image<float> radiance;     ///< W/(mm^2 sr), 3 channels
   Image<float> variance;     ///< of it
   Image<std::uint8_t> mask;  ///< 1: enough usable pixels
+  double place_share =
+      0.0;  ///< of the variance of all usable cells: what an inexact place of the camera adds
 };
 
 /// Takes camera pixels to the cells of the sample's face. A cell, projected into the picture, is a

@@ -118,6 +118,13 @@ TEST(SurfaceMap, AnUnsurePlaceIsVarianceWhereTheLightChanges) {
     const auto [column, row] = kCells[i];
     EXPECT_NEAR(squares[i] / still.variance.at(column, row, 0), 1.0, 0.4) << i;
   }
+  EXPECT_EQ(still.place_share, 1.0);
+  const auto noisy = map->apply(picture(model, field), 0.5);
+  EXPECT_GT(noisy.place_share, 0.0);
+  EXPECT_LT(noisy.place_share, 1.0);
+  EXPECT_EQ(
+      SurfaceMap::create(kBlock, Face::kZMax, model)->apply(picture(model, field), 0.5).place_share,
+      0.0);
 }
 
 TEST(SurfaceMap, AddsVariancesWithTheSquaredWeights) {
