@@ -178,7 +178,8 @@ double LeaningLinks<T>::follow(const Sight& sight, double share) {
     }
   });
   std::swap(gradients_, found_);
-  std::vector<Lanes<T>> change = std::move(sum_);
+  std::vector<Lanes<T>> change;
+  std::swap(change, sum_);
   sum_up(&sight.phi);
   for (std::size_t i = 0; i < sum_.size(); ++i) change[i] -= sum_[i];
   return norm_of(change);
