@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/ensure.h"
-#include "sim/sensor.h"
+#include "sim/hash.h"
 
 namespace opaline::sim {
 namespace {

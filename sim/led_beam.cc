@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "base/thread_team.h"
-#include "sim/sensor.h"
+#include "sim/hash.h"
 
 namespace opaline::sim {
 namespace {

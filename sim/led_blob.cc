@@ -9,8 +9,8 @@
 #include <thread>
 #include <utility>
 
+#include "sim/hash.h"
 #include "sim/led_beam.h"
-#include "sim/sensor.h"
 
 namespace opaline::sim {
 namespace {

@@ -3,16 +3,11 @@
 #include <cstdint>
 
 #include "base/image.h"
+#include "sim/hash.h"
 #include "sim/optics.h"
 
 namespace opaline::sim {
 
-/// A hash of two words in which every bit of either moves half the bits (the finaliser of
-/// splitmix64, Steele et al. 2014): the random numbers of this directory are hashes of what they
-/// are for, never of when they are drawn.
-std::uint64_t mix(std::uint64_t a, std::uint64_t b);
-/// In (0, 1), from the upper 53 bits of a hash.
-double uniform(std::uint64_t hash);
 /// The standard normal distribution's quantile, |error| < 1e-7 of it (Wichura 1988, AS 241, PPND7).
 double normal_quantile(double probability);
 /// The Poisson distribution's quantile: by summation up to a mean of 32, above by Cornish and
