@@ -14,7 +14,7 @@
 namespace opaline::sim {
 namespace {
 
-constexpr int kGroups = 64;  // of paths, summed in an order that does not depend on the threads
+constexpr int kPathGroups = 64;  // of paths, summed in an order that does not depend on the threads
 constexpr double kSamePlace = 4.0;  // pixels between where a path leaves and what its pixel sees
 
 struct Leaving {
@@ -95,6 +95,7 @@ class Catcher {
     const auto seen = truth_.at(camera_,
                                 static_cast<int>(pixel) % camera_.width + 0.5,
                                 static_cast<int>(pixel) / camera_.width + 0.5);
+    if (!seen) return 0.0;
     const Vec3 to = camera_.centre() - seen->point;
     const double cosine = std::max(0.05, dot(seen->normal, to) / length(to));
     const double area = dot(to, to) / (camera_.fx * camera_.fy * cosine);
@@ -125,11 +126,11 @@ Result<BeamLight> BeamLight::trace(const LedSphereOptions& options,
   std::map<std::uint32_t, Rgb> sums;
   for (std::size_t c = 0; c < 3; ++c) {
     const BeamWalk walk(*truth, *entry, way, c);
-    std::vector<Weights> groups(kGroups);
+    std::vector<Weights> groups(kPathGroups);
     team.run([&](int thread) {
-      for (int group = thread; group < kGroups; group += team.size()) {
+      for (int group = thread; group < kPathGroups; group += team.size()) {
         PathNumbers numbers(mix(mix(options.seed, 0x6265616d + c), static_cast<unsigned>(group)));
-        for (std::int64_t n = 0; n < beam.paths / kGroups && !stop.stop_requested(); ++n)
+        for (std::int64_t n = 0; n < beam.paths / kPathGroups && !stop.stop_requested(); ++n)
           if (const auto leaving = walk.trace(numbers))
             catcher.add(*leaving, groups[static_cast<std::size_t>(group)]);
       }
@@ -142,7 +143,7 @@ Result<BeamLight> BeamLight::trace(const LedSphereOptions& options,
                      std::nullopt,
                      nlohmann::json::object()});
   }
-  const auto paths = static_cast<double>(beam.paths / kGroups * kGroups);
+  const auto paths = static_cast<double>(beam.paths / kPathGroups * kPathGroups);
   for (const auto& [pixel, sum] : sums) {
     const double unit =
         options.depolarised * beam.power_w / paths * catcher.radiance(pixel, options.ior);

@@ -22,7 +22,7 @@ using reconstruct::BallTable;
 using reconstruct::CurvatureRatio;
 using reconstruct::LeftOut;
 
-constexpr double kIor = 1.4;
+constexpr double kBallIor = 1.4;
 
 struct Material {
   const char* name;
@@ -42,7 +42,7 @@ double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albe
 }  // namespace
 
 void measure_formulas() {
-  const CurvatureRatio model = *CurvatureRatio::make(kIor);
+  const CurvatureRatio model = *CurvatureRatio::make(kBallIor);
   double round_trip = 0.0;
   double cosine = 0.0;
   for (const double albedo : {0.9, 0.95, 0.99, 0.999})
@@ -61,15 +61,18 @@ void measure_formulas() {
 }
 
 void measure_materials(ThreadTeam& team, std::int64_t paths) {
-  const CurvatureRatio model = *CurvatureRatio::make(kIor);
-  const double inside = reconstruct::diffusion::internal_moments(kIor).fluence;
+  const CurvatureRatio model = *CurvatureRatio::make(kBallIor);
+  const double inside = reconstruct::diffusion::internal_moments(kBallIor).fluence;
   const double a = (1.0 + inside) / (1.0 - inside);
   double worst_diffusion = 0.0;
   double worst_albedo = 0.0;
   for (const Material& m : kMaterials) {
     const double bend = decay(m.reduced_albedo) * m.curvature / 3.0;
     const auto light = *sim::trace_ball(
-        {m.reduced_albedo, 1.0 / (decay(m.reduced_albedo) * m.curvature), kIor}, paths, 99, team);
+        {m.reduced_albedo, 1.0 / (decay(m.reduced_albedo) * m.curvature), kBallIor},
+        paths,
+        99,
+        team);
     const BallTable::Found found = BallTable::standard().find(light.reflectance, light.ratio);
     const double found_bend = decay(found.reduced_albedo) * found.curvature / 3.0;
     const double diffusion_error =
@@ -107,7 +110,7 @@ void measure_beams(ThreadTeam& team, std::int64_t paths) {
     const double radius = 1.0 / (g * m.curvature);  // mean free paths
     const double reach = std::min(8.0 / g, 1.2 * radius);
     const auto beam =
-        sim::trace_beam({m.reduced_albedo, radius, kIor}, reach, 60, paths, 21, team, {});
+        sim::trace_beam({m.reduced_albedo, radius, kBallIor}, reach, 60, paths, 21, team, {});
     if (!beam) continue;
     std::vector<double> distance;
     std::vector<double> exitance;
@@ -115,11 +118,12 @@ void measure_beams(ThreadTeam& team, std::int64_t paths) {
     for (std::size_t n = 0; n < beam->distance.size(); ++n) {
       if (beam->distance[n] < 2.0 || !(beam->exitance[n] > 0.0)) continue;
       distance.push_back(beam->distance[n]);
-      exitance.push_back(beam->exitance[n] / (1.0 - std::pow((kIor - 1.0) / (kIor + 1.0), 2)));
+      exitance.push_back(beam->exitance[n] /
+                         (1.0 - std::pow((kBallIor - 1.0) / (kBallIor + 1.0), 2)));
       const double noise = beam->deviation[n] / beam->exitance[n];
       weight.push_back(1.0 / (noise * noise + 1e-4));
     }
-    const auto found = reconstruct::fit_beam(distance, exitance, weight, kIor);
+    const auto found = reconstruct::fit_beam(distance, exitance, weight, kBallIor);
     if (!found) continue;
     print_figure("led.beam_diffusion_over_truth", m.name, 3.0 * found->diffusion, "1");
     print_figure("led.beam_translucency_over_truth", m.name, found->translucency * g, "1");

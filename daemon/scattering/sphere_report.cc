@@ -157,14 +157,14 @@ Result<void> SphereReport::draw_plot(const CurvePlot& plot,
 Result<void> SphereReport::add_beam() {
   const auto measured =
       measure_beam(maps_, session_, config_.rig.light_stage.beam, config_.led_sphere.ior);
-  if (measured && !*measured) return ok();
+  if (measured && !measured->has_value()) return ok();
   body_ += "<section id=\"beam\">\n<h2>A thin beam, for reference</h2>\n";
   if (!measured) {
     body_ +=
         html::warning(fmt::format("Not measured: {}", measured.error().message)) + "</section>\n";
     return ok();
   }
-  const BeamMeasurement& beam = **measured;
+  const BeamMeasurement beam = measured->value_or(BeamMeasurement{});
   body_ += html::paragraph(
       "The usual way to scattering parameters: a dipole fitted to the light around a thin beam. It "
       "takes the surface for flat, so on a curved object its l_d is too long.");

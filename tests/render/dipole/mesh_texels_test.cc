@@ -13,6 +13,7 @@ using std::numbers::pi;
 using ::testing::HasSubstr;
 
 constexpr double kRadius = 8.0;
+constexpr std::size_t kMiddleRow = std::size_t{32} * 65;  // of view_turned()
 
 /// A ball with longitude and latitude as its coordinates, its seam behind.
 TexturedMesh ball() {
@@ -70,11 +71,11 @@ TEST(MeshTexels, ScreenSpaceAndTextureSpaceSeeTheSameBall) {
   const auto of_world = exitance(world, light);
   const auto of_view = exitance(seen, light);
   for (const int x : {24, 28, 32, 36, 40}) {
-    const std::size_t at = 32 * 65 + static_cast<std::size_t>(x);
+    const std::size_t at = kMiddleRow + static_cast<std::size_t>(x);
     ASSERT_EQ(seen.covered[at], 1);
     const double turn = std::atan2(seen.position[at].x, seen.position[at].z);
     const auto there = static_cast<std::size_t>(192.0 * (turn / (2.0 * pi) + 0.5));
-    EXPECT_NEAR(of_view[at] / of_world[48 * 192 + there], 1.0, 0.03) << x;
+    EXPECT_NEAR(of_view[at] / of_world[std::size_t{48} * 192 + there], 1.0, 0.03) << x;
   }
 }
 
@@ -83,7 +84,7 @@ TEST(MeshTexels, ABallLooksTheSameFromEverySide) {
   const DipoleTexture texture = even(0.9F, 0.165F);
   const auto front = exitance(*texels_of_view(mesh, texture, view_turned(0.0)), {1.0, {}});
   const auto side = exitance(*texels_of_view(mesh, texture, view_turned(1.2)), {1.0, {}});
-  EXPECT_NEAR(side[32 * 65 + 32] / front[32 * 65 + 32], 1.0, 0.01);
+  EXPECT_NEAR(side[kMiddleRow + 32] / front[kMiddleRow + 32], 1.0, 0.01);
 }
 
 TEST(MeshTexels, TheNearerSurfaceHidesTheOneBehind) {
