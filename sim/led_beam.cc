@@ -92,9 +92,9 @@ class Catcher {
   }
   /// Radiance of a pixel over power that leaves towards it.
   double radiance(std::uint32_t pixel, double ior) const {
-    const auto seen = truth_.at(camera_,
-                                static_cast<int>(pixel) % camera_.width + 0.5,
-                                static_cast<int>(pixel) / camera_.width + 0.5);
+    const int row = static_cast<int>(pixel) / camera_.width;
+    const int column = static_cast<int>(pixel) % camera_.width;
+    const auto seen = truth_.at(camera_, column + 0.5, row + 0.5);
     if (!seen) return 0.0;
     const Vec3 to = camera_.centre() - seen->point;
     const double cosine = std::max(0.05, dot(seen->normal, to) / length(to));
@@ -143,7 +143,8 @@ Result<BeamLight> BeamLight::trace(const LedSphereOptions& options,
                      std::nullopt,
                      nlohmann::json::object()});
   }
-  const auto paths = static_cast<double>(beam.paths / kPathGroups * kPathGroups);
+  const auto in_a_group = beam.paths / kPathGroups;
+  const auto paths = static_cast<double>(in_a_group * kPathGroups);
   for (const auto& [pixel, sum] : sums) {
     const double unit =
         options.depolarised * beam.power_w / paths * catcher.radiance(pixel, options.ior);

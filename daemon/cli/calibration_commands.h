@@ -6,7 +6,7 @@
 
 #include "daemon/cli/calibration.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
 }
 

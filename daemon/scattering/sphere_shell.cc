@@ -15,7 +15,6 @@
 namespace opaline::daemon {
 namespace {
 
-using reconstruct::LeftOut;
 using reconstruct::ScatteringMaps;
 
 constexpr double kShellDepth = 3.0;  // l_d

@@ -124,7 +124,8 @@ TEST(Illuminate, ShinesTowardsTheEyeAsTheReconstructionPredicts) {
                                      .irradiance = spot.irradiance,
                                      .radiance = Image<float>(6, 5, 3),
                                      .radiance_variance = Image<float>(6, 5, 3, 1.0F),
-                                     .mask = Image<std::uint8_t>(6, 5, 1, 1)}}};
+                                     .mask = Image<std::uint8_t>(6, 5, 1, 1)}},
+                  .uniform = {}};
   TranslucencyOptions options = options_of(SourceModel::kCollimated);
   options.eye = Vec3{30.0, -12.0, 20.0};
   const auto fields = illuminate(material, std::vector{spot}, options, *solver, {});
