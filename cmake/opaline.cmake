@@ -52,13 +52,14 @@ function(opaline_unite target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# opaline_library(NAME SOURCES a.cc ... USES lower_library ... LINK third::party ...)
+# opaline_library(NAME [APART] SOURCES a.cc ... USES lower_library ... LINK third::party ...)
 # USES is the layer; tests/layering_test.cc holds it, and every #include, against the table of docs/architecture.md.
-# LINK is private to the library; a third party that a header shows goes under PUBLIC_LINK.
+# LINK is private to the library; a third party that a header shows goes under PUBLIC_LINK. APART: never united, since programs
+# that use one of its sources shall not link what another one needs (tests/linking_test.cc).
 function(opaline_library name)
-  cmake_parse_arguments(A "" "" "SOURCES;USES;LINK;PUBLIC_LINK" ${ARGN})
+  cmake_parse_arguments(A "APART" "" "SOURCES;USES;LINK;PUBLIC_LINK" ${ARGN})
   add_library(opaline_${name} STATIC ${A_SOURCES})
-  if(OPALINE_UNITY)
+  if(OPALINE_UNITY AND NOT A_APART)
     opaline_unite(opaline_${name} ${A_SOURCES})
   endif()
   list(TRANSFORM A_USES PREPEND opaline_)

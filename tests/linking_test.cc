@@ -49,6 +49,10 @@ const std::set<std::string> kLenses{"libceres",
                                     "libopencv_imgproc",
                                     "libopencv_mcc"};
 
+/// A sample's holder is found by its markers.
+const std::set<std::string> kBoards{
+    "libopencv_aruco", "libopencv_calib3d", "libopencv_core", "libopencv_imgproc"};
+
 std::set<std::string> join(std::initializer_list<std::set<std::string>> sets) {
   std::set<std::string> all;
   for (const auto& set : sets) all.insert(set.begin(), set.end());
@@ -59,7 +63,7 @@ const std::map<std::string, std::set<std::string>> kMayLink{
     {"opaline", {"libcurl"}},
     {"opalined", {"libsqlite3"}},
     {"opaline-calibrate", join({kLenses, kPictures, kUsb})},
-    {"opaline-capture", join({kPictures, kUsb})},
+    {"opaline-capture", join({kBoards, kPictures, kUsb})},
     {"opaline-guardian", kUsb},
     {"opaline-preview", join({kPictures, kVolumes, kProcessor})},
     {"opaline-reconstruct", join({kPictures, kVolumes, kProcessor})},

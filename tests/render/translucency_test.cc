@@ -105,7 +105,7 @@ TEST(Illuminate, AnswersEachLightInItsPlaceAndSuperposes) {
               1e-6);
 }
 
-// The radiance towards the eye, by the P1 law from the field, is what the reconstruction predicts there; in float32.
+// The radiance towards the eye, by the P1 law from the field, is what the reconstruction predicts of unlit cells; in float32.
 TEST(Illuminate, ShinesTowardsTheEyeAsTheReconstructionPredicts) {
   const Block block{8, 6, 5, 0.8, 1.0, 0.6};
   const Material material = material_of(block, {0.01, 0.02, 0.03});
@@ -141,7 +141,12 @@ TEST(Illuminate, ShinesTowardsTheEyeAsTheReconstructionPredicts) {
           reconstruct::diffusion::camera_equation(material.ior, boundary, view.cosine.at(x, y));
       const double source = face.fluence.at(x, y, 1) - 2.0 * boundary.a * face.net_flux.at(x, y, 1);
       const double shown = p1.radiance(source, face.net_flux.at(x, y, 1));
-      EXPECT_NEAR(shown, predicted->front().at(x, y, 1), 2e-6 * predicted->front().at(1, 3, 1));
+      const double diffuse = predicted->front().at(x, y, 1);
+      if (x == 1 && y == 3) {
+        EXPECT_GT(shown, diffuse) << "the lit cell, with what shines there beyond diffusion";
+      } else {
+        EXPECT_NEAR(shown, diffuse, 2e-6 * predicted->front().at(1, 3, 1));
+      }
     }
   }
 }
