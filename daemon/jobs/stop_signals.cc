@@ -1,6 +1,7 @@
 #include "daemon/jobs/stop_signals.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <array>
@@ -40,10 +41,20 @@ void restore_handlers() {
   }
 }
 
-// Until the write end is closed.
+sigset_t stop_set() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int signal : {SIGTERM, SIGINT}) sigaddset(&set, signal);
+  return set;
+}
+
+// Until the write end is closed. It waits in poll(): ThreadSanitizer runs no handler during read().
 void pass_on(int fd, const std::function<void(int)>& on_signal) {
-  char signal = 0;
   for (;;) {
+    pollfd ready{fd, POLLIN, 0};
+    if (::poll(&ready, 1, -1) < 0 && errno != EINTR) return;
+    if (ready.revents == 0) continue;
+    char signal = 0;
     const ssize_t n = ::read(fd, &signal, 1);
     if (n == 1) on_signal(signal);
     if (n == 0 || (n < 0 && errno != EINTR)) return;
@@ -62,17 +73,23 @@ Result<std::unique_ptr<StopSignals>> StopSignals::watch(std::function<void(int)>
 StopSignals::StopSignals(FileDescriptor read_end,
                          FileDescriptor write_end,
                          std::function<void(int)> on_signal)
-    : read_end_(std::move(read_end)),
-      write_end_(std::move(write_end)),
-      thread_([fd = read_end_.get(), handler = std::move(on_signal)] { pass_on(fd, handler); }) {
+    : read_end_(std::move(read_end)), write_end_(std::move(write_end)) {
   signal_pipe = write_end_.get();
   install_handlers();
+  const sigset_t stops = stop_set();
+  ::pthread_sigmask(SIG_BLOCK, &stops, &old_mask_);
+  thread_ = std::jthread([stops, fd = read_end_.get(), handler = std::move(on_signal)] {
+    ::pthread_sigmask(SIG_UNBLOCK, &stops, nullptr);
+    pass_on(fd, handler);
+  });
 }
 
 StopSignals::~StopSignals() {
   restore_handlers();
   signal_pipe = -1;
   write_end_.reset();  // the thread reads the end of the file and returns
+  thread_.join();
+  ::pthread_sigmask(SIG_SETMASK, &old_mask_, nullptr);
 }
 
 }  // namespace opaline::daemon
