@@ -13,9 +13,11 @@
 #include "base/seconds.h"
 #include "capture/disk_space.h"
 #include "capture/frame_store.h"
+#include "capture/gradient_object.h"
 #include "capture/hdr_file.h"
 #include "capture/hdr_merge.h"
 #include "capture/lamp_check.h"
+#include "capture/lamp_file.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
 #include "capture/stage_view.h"
@@ -25,22 +27,10 @@
 namespace opaline::capture {
 namespace {
 
-namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 constexpr const char* kBlackName = "black";
-constexpr const char* kLampFile = "lamps.json";
 constexpr double kHopelessDrift = 10.0;  // over the limit
-
-double mean(const Image<float>& picture, int x, int y) {
-  return (picture.at(x, y, 0) + picture.at(x, y, 1) + picture.at(x, y, 2)) / 3.0;
-}
-
-StageLight beam_alone(std::size_t lights) {
-  StageLight beam{"beam", std::vector<std::uint8_t>(lights, 0)};
-  beam.codes.back() = 255;
-  return beam;
-}
 
 /// One run over a session directory.
 class GradientSequence {
@@ -59,8 +49,8 @@ class GradientSequence {
  private:
   using Frames = std::vector<CapturedFrame>;
   drivers::Pattern picture_of(const StageLight& light, std::uint64_t id) const;
+  drivers::Pattern black_pattern() const;
   Result<RegionTaker*> taker(std::stop_token stop);
-  Result<Frames> load(const std::string& name, const drivers::Pattern& pattern);
   Result<void> check_space() const;
   Result<void> take_black(std::stop_token stop);
   void use_black(Frames frames);
@@ -70,7 +60,6 @@ class GradientSequence {
   Result<Frames> take(std::size_t n, const drivers::Pattern& pattern, std::stop_token stop);
   Result<void> do_light(std::size_t n, std::stop_token stop);
   Result<void> find_object(const HdrImage& constant);
-  double light_on_object(const HdrImage& hdr) const;
   Result<void> judge_drift();
   Result<void> finish();
   void report(const std::string& name, std::optional<nanoseconds> exposure) const;
@@ -99,15 +88,14 @@ drivers::Pattern GradientSequence::picture_of(const StageLight& light, std::uint
        light.name});
 }
 
+drivers::Pattern GradientSequence::black_pattern() const {
+  return picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern);
+}
+
 void GradientSequence::use_black(Frames frames) {
   black_frames_ = std::move(frames);
   black_ = BlackFrames(black_frames_, task_.camera, seen_);
   merge_.emplace(task_.camera, black_.hot());
-}
-
-Result<GradientSequence::Frames> GradientSequence::load(const std::string& name,
-                                                        const drivers::Pattern& pattern) {
-  return usable_frames(store_, name, pattern, task_.camera.model, work_.events);
 }
 
 Result<RegionTaker*> GradientSequence::taker(std::stop_token stop) {
@@ -137,8 +125,7 @@ Result<void> GradientSequence::check_space() const {
 }
 
 Result<void> GradientSequence::take_black(std::stop_token stop) {
-  const drivers::Pattern black =
-      picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern);
+  const drivers::Pattern black = black_pattern();
   auto taken = taker_->take_black(
       black, [this](nanoseconds e) { report(kBlackName, e); }, stop);
   if (!taken) return taken.error();
@@ -175,7 +162,7 @@ Result<GradientSequence::Frames> GradientSequence::take(std::size_t n,
 
 Result<GradientSequence::Frames> GradientSequence::frames_of(std::size_t n, std::stop_token stop) {
   const drivers::Pattern pattern = picture_of(patterns_[n], kFirstLight + n);
-  auto stored = load(patterns_[n].name, pattern);
+  auto stored = usable_frames(store_, patterns_[n].name, pattern, task_.camera.model, work_.events);
   if (!stored) return stored.error();
   std::vector<nanoseconds> exposures;
   for (const CapturedFrame& frame : *stored) exposures.push_back(frame.exposure_asked);
@@ -197,39 +184,21 @@ Result<void> GradientSequence::do_light(std::size_t n, std::stop_token stop) {
   const HdrImage hdr = merge_->merge(pairs);
   if (n == 0) {
     if (auto found = find_object(hdr); !found) return found;
-    first_light_ = light_on_object(hdr);
+    first_light_ = light_in(hdr, black_.footprint());
   }
-  if (n + 1 == patterns_.size()) summary_.drift = light_on_object(hdr) / first_light_ - 1.0;
+  if (n + 1 == patterns_.size())
+    summary_.drift = light_in(hdr, black_.footprint()) / first_light_ - 1.0;
   ++summary_.pictures;
   return write_hdr(work_.files, work_.directory / "hdr" / (name + ".exr"), hdr);
 }
 
 Result<void> GradientSequence::find_object(const HdrImage& constant) {
   const double white = task_.depolarised * mean_radiance(lights_, patterns_[0].codes);
-  std::size_t count = 0;
-  for (int y = 0; y < seen_.height(); ++y)
-    for (int x = 0; x < seen_.width(); ++x) {
-      const bool bright = mean(constant.radiance, x, y) > task_.gradient.object_threshold * white;
-      seen_.at(x, y) = bright ? 1 : 0;
-      count += bright ? 1 : 0;
-    }
-  if (count < 100)
-    return unavailable(fmt::format(
-        "{} pixels are brighter than {:.3g} % of a white surface: is the object in the middle of "
-        "the sphere, and are camera and lamps calibrated? (led_sphere.object_threshold)",
-        count,
-        100.0 * task_.gradient.object_threshold));
+  auto found = brighter_pixels(constant, task_.gradient.object_threshold, white);
+  if (!found) return found.error();
+  seen_ = *std::move(found);
   use_black(std::move(black_frames_));  // their footprint is the object from here on
   return ok();
-}
-
-double GradientSequence::light_on_object(const HdrImage& hdr) const {
-  double sum = 0.0;
-  for (int y = 0; y < seen_.height(); ++y)
-    for (int x = 0; x < seen_.width(); ++x)
-      if (black_.footprint().at(x, y) != 0 && hdr.mask.at(x, y) != 0)
-        sum += mean(hdr.radiance, x, y);
-  return sum;
 }
 
 Result<void> GradientSequence::judge_drift() {
@@ -286,10 +255,8 @@ Result<std::vector<int>> GradientSequence::ask_lamps(std::stop_token stop) {
   const auto check = check_lamps(
       **single, black_, task_.camera, lights_, axes_of(task_.camera.model)[2], told, stop);
   if (!check) return check.error();
-  const nlohmann::ordered_json json{
-      {"format", 1}, {"tried", check->tried.size()}, {"dead", check->dead}};
-  auto written = write_whole(work_.files, work_.directory / kLampFile, json.dump() + "\n");
-  if (!written) return written.error();
+  if (auto written = write_lamp_check(work_.files, work_.directory, *check); !written)
+    return written.error();
   auto noted =
       work_.events.fact("stage.lamps", {{"tried", check->tried.size()}, {"dead", check->dead}});
   if (!noted) return noted.error();
@@ -298,11 +265,8 @@ Result<std::vector<int>> GradientSequence::ask_lamps(std::stop_token stop) {
 
 Result<void> GradientSequence::find_dead_lamps(std::stop_token stop) {
   if (!task_.gradient.check_lamps) return ok();
-  if (const auto text = read_text(work_.directory / kLampFile)) {
-    const auto json = nlohmann::json::parse(*text, nullptr, false);
-    if (const auto dead = json.find("dead"); json.is_object() && dead != json.end())
-      for (const auto& lamp : *dead)
-        if (lamp.is_number_unsigned()) summary_.dead_lamps.push_back(lamp.get<int>());
+  if (auto known = read_lamp_check(work_.directory)) {
+    summary_.dead_lamps = *std::move(known);
   } else {
     auto found = ask_lamps(stop);
     if (!found) return found.error();
@@ -317,13 +281,11 @@ Result<void> GradientSequence::find_dead_lamps(std::stop_token stop) {
 }
 
 Result<GradientSummary> GradientSequence::run(std::stop_token stop) {
-  for (const fs::path& directory : {store_.directory(), work_.directory / "hdr"}) {
+  for (const std::filesystem::path& directory : {store_.directory(), work_.directory / "hdr"}) {
     if (auto made = work_.files.make_directories(directory); !made) return made.error();
   }
   remove_partial_files(work_.files, work_.directory);
-  auto black = load(
-      kBlackName,
-      picture_of({kBlackName, std::vector<std::uint8_t>(task_.lights.size(), 0)}, kBlackPattern));
+  auto black = usable_frames(store_, kBlackName, black_pattern(), task_.camera.model, work_.events);
   if (!black) return black.error();
   if (!black->empty()) {
     use_black(*std::move(black));

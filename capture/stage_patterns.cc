@@ -132,6 +132,12 @@ Result<std::vector<StageLight>> stage_patterns(std::span<const SphereLight> ligh
   return patterns;
 }
 
+StageLight beam_alone(std::size_t lights) {
+  StageLight beam{"beam", std::vector<std::uint8_t>(lights, 0)};
+  beam.codes.back() = 255;
+  return beam;
+}
+
 double mean_radiance(std::span<const SphereLight> lights, std::span<const std::uint8_t> codes) {
   double sum = 0.0;
   for (std::size_t n = 0; n < lights.size(); ++n)

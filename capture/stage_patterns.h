@@ -47,6 +47,9 @@ Result<std::vector<StageLight>> stage_patterns(std::span<const SphereLight> ligh
                                                const std::array<Vec3, 3>& axes,
                                                const StagePatternOptions& options);
 
+/// "beam": the last of so many lights alone, at full code. `lights` > 0.
+StageLight beam_alone(std::size_t lights);
+
 /// Radiance of the even surroundings that a pattern amounts to: sum of code/255 I / d^2 over 4 pi, W/(mm^2 sr).
 double mean_radiance(std::span<const SphereLight> lights, std::span<const std::uint8_t> codes);
 
