@@ -29,9 +29,7 @@ Result<BeamProfile> trace_beam(const Ball& ball,
                                std::uint64_t seed,
                                ThreadTeam& team,
                                std::stop_token stop) {
-  if (!(ball.reduced_albedo >= 0.0 && ball.reduced_albedo < 1.0) ||
-      !(ball.radius >= 1.0 && ball.radius <= 1e6) || !(ball.ior >= 1.0 && ball.ior <= 3.0))
-    return invalid_argument("beam: a ball that cannot be; see sim/ball_transport.h");
+  if (auto good = check(ball); !good) return good.error();
   if (!(reach > 0.0 && reach < 0.5 * pi * ball.radius) || rings < 2 || paths < kBatch)
     return invalid_argument(fmt::format(
         "beam: {} rings out to {} mean free paths; expected 2 or more within a quarter turn "

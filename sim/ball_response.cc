@@ -23,15 +23,8 @@ double interpolated(const std::vector<double>& values, double place) {
   return (1.0 - part) * values[n] + part * values[n + 1];
 }
 
-Result<void> check(const Ball& ball, double distance, const ResponseSize& size) {
-  if (!(ball.reduced_albedo >= 0.0 && ball.reduced_albedo < 1.0))
-    return invalid_argument(
-        fmt::format("reduced albedo {}; expected 0 to below 1", ball.reduced_albedo));
-  if (!(ball.radius >= 1.0 && ball.radius <= 1e6))
-    return invalid_argument(
-        fmt::format("radius of {} mean free paths; expected 1 to 1e6", ball.radius));
-  if (!(ball.ior >= 1.0 && ball.ior <= 3.0))
-    return invalid_argument(fmt::format("refractive index {}; expected 1 to 3", ball.ior));
+Result<void> check_response(const Ball& ball, double distance, const ResponseSize& size) {
+  if (auto good = check(ball); !good) return good;
   if (!(distance > 1.0))
     return invalid_argument(
         fmt::format("a light at {} radii; expected it outside the ball", distance));
@@ -127,7 +120,7 @@ Result<BallResponse> trace_response(const Ball& ball,
                                     std::uint64_t seed,
                                     ThreadTeam& team,
                                     std::stop_token stop) {
-  if (auto good = check(ball, light_distance, size); !good) return good.error();
+  if (auto good = check_response(ball, light_distance, size); !good) return good.error();
   const LitBall lit(ball, light_distance);
   const Tally none{std::vector<double>(static_cast<std::size_t>(size.angles), 0.0),
                    std::vector<double>(static_cast<std::size_t>(size.cosines), 0.0)};

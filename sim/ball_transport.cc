@@ -47,20 +47,6 @@ class Tracer {
   BallWalk walk_;
 };
 
-Result<void> check(const Ball& ball, std::int64_t paths) {
-  if (!(ball.reduced_albedo >= 0.0 && ball.reduced_albedo < 1.0))
-    return invalid_argument(
-        fmt::format("reduced albedo {}; expected 0 to below 1", ball.reduced_albedo));
-  if (!(ball.radius >= 1.0 && ball.radius <= 1e6))
-    return invalid_argument(
-        fmt::format("radius of {} mean free paths; expected 1 to 1e6", ball.radius));
-  if (!(ball.ior >= 1.0 && ball.ior <= 3.0))
-    return invalid_argument(fmt::format("refractive index {}; expected 1 to 3", ball.ior));
-  if (paths < 2 * kBatch || paths > std::int64_t{1} << 40U)
-    return invalid_argument(fmt::format("{} paths; expected at least {}", paths, 2 * kBatch));
-  return ok();
-}
-
 BallLight summary(const std::vector<Sums>& batches) {
   const auto count = static_cast<double>(batches.size());
   Sums mean;
@@ -88,11 +74,25 @@ BallLight summary(const std::vector<Sums>& batches) {
 
 }  // namespace
 
+Result<void> check(const Ball& ball) {
+  if (!(ball.reduced_albedo >= 0.0 && ball.reduced_albedo < 1.0))
+    return invalid_argument(
+        fmt::format("reduced albedo {}; expected 0 to below 1", ball.reduced_albedo));
+  if (!(ball.radius >= 1.0 && ball.radius <= 1e6))
+    return invalid_argument(
+        fmt::format("radius of {} mean free paths; expected 1 to 1e6", ball.radius));
+  if (!(ball.ior >= 1.0 && ball.ior <= 3.0))
+    return invalid_argument(fmt::format("refractive index {}; expected 1 to 3", ball.ior));
+  return ok();
+}
+
 Result<BallLight> trace_ball(const Ball& ball,
                              std::int64_t paths,
                              std::uint64_t seed,
                              ThreadTeam& team) {
-  if (Result<void> good = check(ball, paths); !good) return good.error();
+  if (Result<void> good = check(ball); !good) return good.error();
+  if (paths < 2 * kBatch || paths > std::int64_t{1} << 40U)
+    return invalid_argument(fmt::format("{} paths; expected at least {}", paths, 2 * kBatch));
   const Tracer tracer(ball);
   std::vector<Sums> batches(static_cast<std::size_t>((paths + kBatch - 1) / kBatch));
   team.run([&](int thread) {

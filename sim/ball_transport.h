@@ -14,6 +14,9 @@ struct Ball {
   double ior = 1.4;              ///< 1 to 3
 };
 
+/// Errors: kInvalidArgument outside the ranges above.
+Result<void> check(const Ball& ball);
+
 /// What leaves the ball under light from all sides, cross-polarised: only what has scattered more than once.
 struct BallLight {
   double reflectance = 0.0;            ///< flux out over flux in, constant light

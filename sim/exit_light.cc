@@ -90,9 +90,7 @@ Result<std::vector<ExitLight>> trace_exit_light(const Ball& ball,
                                                 std::int64_t paths,
                                                 std::uint64_t seed,
                                                 ThreadTeam& team) {
-  if (!(ball.reduced_albedo > 0.0 && ball.reduced_albedo < 1.0) ||
-      !(ball.radius >= 1.0 && ball.radius <= 1e6) || !(ball.ior >= 1.0 && ball.ior <= 3.0))
-    return invalid_argument("exit light: a ball that cannot be; see sim/ball_transport.h");
+  if (auto good = check(ball); !good) return good.error();
   if (edges.size() < 2 || edges.front() < 0.0 || edges.back() > 1.0 ||
       std::ranges::adjacent_find(edges, std::greater_equal<>()) != edges.end() ||
       paths < 2 * kExitBatch)
