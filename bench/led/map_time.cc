@@ -7,10 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "base/ensure.h"
 #include "base/light_sphere.h"
+#include "base/stage_record.h"
 #include "bench/figure.h"
 #include "bench/led/ball_case.h"
 #include "bench/stopwatch.h"
+#include "capture/stage_patterns.h"
 #include "reconstruct/spherical_gradient/ball_table.h"
 #include "reconstruct/spherical_gradient/stage_correction.h"
 
@@ -74,13 +77,18 @@ double seconds_of_optimiser(const BallTable& table, double reflectance, double r
   return watch.seconds() / kPixels;
 }
 
-}  // namespace
-
-void measure_time(ThreadTeam& team) {
-  constexpr int kRounds = 3;
+/// Ten megapixels of a ball, four fifths of its diameter high.
+sim::BallScene large_ball(double noise) {
   sim::BallScene scene;
-  scene.noise = 0.01;
-  scene.pixel_mm = 1.6 * scene.radius_mm / 3163.0;  // ten megapixels
+  scene.noise = noise;
+  scene.pixel_mm = 1.6 * scene.radius_mm / 3163.0;
+  return scene;
+}
+
+/// Maps, and what an optimiser would take for those of their pixels that have an answer.
+void measure_maps(const char* which, double noise, ThreadTeam& team) {
+  constexpr int kRounds = 3;
+  const sim::BallScene scene = large_ball(noise);
   const auto [reflectance, ratio] = BallTable::standard().light(scene.reduced_albedo, 0.15);
   const auto pictures = pictures_of(scene, sim::draw_ball(scene, {reflectance, 0.0, ratio, 0.0}));
   std::vector<double> seconds;
@@ -94,12 +102,50 @@ void measure_time(ThreadTeam& team) {
   const double taken = median(seconds);
   const auto measured =
       static_cast<double>(std::ranges::count(pictures.measured, reconstruct::kMeasured));
-  print_figure("led.map_share_found", "ball", found / measured, "1");
-  print_figure("led.map_seconds_10mp", "ball", taken, "s");
+  print_figure("led.map_share_found", which, found / measured, "1");
+  print_figure("led.map_seconds_10mp", which, taken, "s");
   const double optimiser =
       seconds_of_optimiser(BallTable::standard(), reflectance, ratio) * found / team.size();
-  print_figure("led.optimiser_seconds_10mp", "ball", optimiser, "s");
-  print_figure("led.optimiser_ratio", "ball", optimiser / taken, "x");
+  print_figure("led.optimiser_seconds_10mp", which, optimiser, "s");
+  print_figure("led.optimiser_ratio", which, optimiser / taken, "x");
+}
+
+/// What comes before the maps in a sphere of 156 lamps. The pictures are ideal ones already, which costs the same.
+void measure_correction(ThreadTeam& team) {
+  const sim::BallScene scene = large_ball(0.01);
+  const auto [reflectance, ratio] = BallTable::standard().light(scene.reduced_albedo, 0.15);
+  auto drawn = sim::draw_ball(scene, {reflectance, 0.0, ratio, 0.0});
+  StageRecord stage;
+  stage.lights = light_sphere(156, 600.0, 1.0);
+  stage.pixel_mm = scene.pixel_mm;
+  stage.middle_x = 0.5 * drawn.width;
+  stage.middle_y = 0.5 * drawn.height;
+  stage.distance_mm = 1000.0;
+  const auto patterns = capture::stage_patterns(stage.lights, stage.axes, {.specular = false});
+  ENSURE(patterns);
+  reconstruct::StagePictures pictures;
+  pictures.width = drawn.width;
+  pictures.height = drawn.height;
+  pictures.measured = std::move(drawn.measured);
+  pictures.constant = {
+      std::move(drawn.radiance[0]), std::move(drawn.variance[0]), (*patterns)[0].codes};
+  for (std::size_t a = 0; a < 3; ++a)
+    pictures.gradients[a] = {std::move(drawn.radiance[a + 1]),
+                             std::move(drawn.variance[a + 1]),
+                             (*patterns)[a + 1].codes};
+  const Stopwatch watch;
+  const auto ideal = reconstruct::ideal_pictures(pictures, stage, 1.4, team);
+  const double seconds = watch.seconds();
+  ENSURE(ideal);
+  print_figure("led.correction_seconds_10mp", "156 lamps", seconds, "s");
+}
+
+}  // namespace
+
+void measure_time(ThreadTeam& team) {
+  measure_maps("ball", 0.01, team);
+  measure_maps("ball, windows of few pixels", 1e-4, team);
+  measure_correction(team);
 }
 
 }  // namespace opaline::bench

@@ -44,7 +44,7 @@ double formula_error(const StageCase& stage,
   const CurvatureRatio model = *CurvatureRatio::make(kIor);
   const double inside = reconstruct::diffusion::internal_moments(kIor).fluence;
   const double a = (1.0 + inside) / (1.0 - inside);
-  reconstruct::PixelValues values(ideal.width, ideal.height);
+  reconstruct::PixelValues values(ideal.width, ideal.height, team);
   for (std::size_t at = 0; at < ideal.measured.size(); ++at) {
     if (ideal.measured[at] != reconstruct::kMeasured) continue;
     std::array<double, 3> gradient{};

@@ -29,7 +29,7 @@ constexpr double kWhite = 0.003;    // relative: better than any white target
 constexpr std::size_t kPowers = 5;  // of the spread's polynomial
 constexpr double kMostUneven = 100.0;
 constexpr int kIterations = 40;
-constexpr double kArrived = 1e-9;  // quadratic: the next step would be nothing
+constexpr double kArrived = 3e-6;  // quadratic: the next step would be some 1e-11
 
 double decay(double reduced_albedo) { return std::sqrt(3.0 * (1.0 - reduced_albedo)); }
 double logit(double share) { return std::log(share / (1.0 - share)); }
@@ -258,13 +258,15 @@ double BallTable::flat_ratio(double reflectance) const {
 /// Newton's iteration, kept within reach of the table; whether it arrived.
 bool BallTable::search(double wanted_ratio, double wanted_logit, int steps, Place& at) const {
   for (int n = 0; n < steps; ++n) {
-    const Value r = log_ratio(at.u, at.x);
-    const Value b = logit_reflectance(at.u, at.x);
-    const double det = r.by_u * b.by_x - r.by_x * b.by_u;
-    const double off_r = wanted_ratio - r.value;
-    const double off_b = wanted_logit - b.value;
-    const double step_u = std::clamp((off_r * b.by_x - off_b * r.by_x) / det, -0.5, 0.5);
-    const double step_x = std::clamp((off_b * r.by_u - off_r * b.by_u) / det, -0.1, 0.1);
+    at.ratio = log_ratio(at.u, at.x);
+    at.logit = logit_reflectance(at.u, at.x);
+    const double inverse = 1.0 / at.determinant();
+    const double off_r = wanted_ratio - at.ratio.value;
+    const double off_b = wanted_logit - at.logit.value;
+    const double step_u =
+        std::clamp((off_r * at.logit.by_x - off_b * at.ratio.by_x) * inverse, -0.5, 0.5);
+    const double step_x =
+        std::clamp((off_b * at.ratio.by_u - off_r * at.logit.by_u) * inverse, -0.1, 0.1);
     at.u = std::clamp(at.u + step_u, least_u_ - 0.2, most_u_ + 0.1);
     at.x = std::clamp(at.x + step_x, -0.02, 1.1 * most_x_);
     if (std::abs(step_u) + std::abs(step_x) < kArrived) return true;
@@ -277,18 +279,16 @@ BallTable::Found BallTable::found(double reflectance, double ratio, const Place&
   if (at.u > most_u_) return {.end = End::kTooDark};
   if (!(at.x > 0.0)) return {.end = End::kFlat};
   if (at.x > most_x_) return {.end = End::kTooTranslucent};
-  const Value r = log_ratio(at.u, at.x);
-  const Value b = logit_reflectance(at.u, at.x);
-  const double det = r.by_u * b.by_x - r.by_x * b.by_u;
+  const double det = at.determinant();
   const double by_logit = 1.0 / (reflectance * (1.0 - reflectance));
   const double g = std::exp(at.u);
   return Found{End::kFound,
                1.0 - g * g / 3.0,
                at.x,
-               {-r.by_x / det * by_logit,
-                b.by_x / det / ratio,
-                r.by_u / det / at.x * by_logit,
-                -b.by_u / det / at.x / ratio}};
+               {-at.ratio.by_x / det * by_logit,
+                at.logit.by_x / det / ratio,
+                at.ratio.by_u / det / at.x * by_logit,
+                -at.logit.by_u / det / at.x / ratio}};
 }
 
 BallTable::Found BallTable::find(double reflectance, double ratio) const {
@@ -300,7 +300,7 @@ BallTable::Found BallTable::find(double reflectance, double ratio) const {
   const double u = decay_of(reflectance, 0.0);
   const Value start = log_ratio(u, 0.0);
   if (wanted_ratio <= start.value) return {.end = End::kFlat};
-  Place at{u, std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_)};
+  Place at{u, std::clamp((wanted_ratio - start.value) / start.by_x, 0.0, 0.5 * most_x_), {}, {}};
   search(wanted_ratio, wanted_logit, kIterations, at);
   return found(reflectance, ratio, at);
 }
@@ -308,7 +308,7 @@ BallTable::Found BallTable::find(double reflectance, double ratio) const {
 BallTable::Found BallTable::find(double reflectance, double ratio, const Found& near) const {
   constexpr int kSteps = 6;
   if (near.end == End::kFound && reflectance > 0.0 && reflectance < 1.0 && ratio > 0.0) {
-    Place at{0.5 * std::log(3.0 * (1.0 - near.reduced_albedo)), near.curvature};
+    Place at{0.5 * std::log(3.0 * (1.0 - near.reduced_albedo)), near.curvature, {}, {}};
     if (search(std::log(ratio), logit(reflectance), kSteps, at)) {
       const Found answer = found(reflectance, ratio, at);
       if (answer.end == End::kFound) return answer;

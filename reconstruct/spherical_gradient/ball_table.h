@@ -90,6 +90,9 @@ class BallTable {
   struct Place {
     double u;
     double x;
+    Value ratio;  // ln r and logit R where the last step began
+    Value logit;
+    double determinant() const { return ratio.by_u * logit.by_x - ratio.by_x * logit.by_u; }
   };
   bool search(double log_ratio, double logit, int steps, Place& at) const;
   Found found(double reflectance, double ratio, const Place& at) const;

@@ -28,15 +28,19 @@ double boundary_of(double ior) {
   return (1.0 + inside) / (1.0 - inside);
 }
 
+double length_of(const std::array<double, 3>& v) {
+  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
 void turn_normal(double by_x, double by_y, std::size_t at, ScatteringMaps& maps) {
   const std::array<double, 3> n{maps.normal_x[at], maps.normal_y[at], maps.normal_z[at]};
   const double along = by_x * n[0] + by_y * n[1];
   std::array<double, 3> turn{by_x - along * n[0], by_y - along * n[1], -along * n[2]};
-  const double size = std::hypot(turn[0], turn[1], turn[2]);
+  const double size = length_of(turn);
   const double kept = size > kMostTurn ? kMostTurn / size : 1.0;
   std::array<double, 3> sharp{};
   for (std::size_t k = 0; k < 3; ++k) sharp[k] = n[k] - kept * turn[k];
-  const double length = std::hypot(sharp[0], sharp[1], sharp[2]);
+  const double length = length_of(sharp);
   if (!(length > 0.0)) return;
   maps.normal_x[at] = static_cast<float>(sharp[0] / length);
   maps.normal_y[at] = static_cast<float>(sharp[1] / length);

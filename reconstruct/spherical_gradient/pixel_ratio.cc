@@ -53,7 +53,7 @@ void measure_pixel(const GradientPictures& p,
   if (p.measured[at] != kMeasured || !(p.radiance[0][at] > 0.0F)) return;
   const PixelRatio r = ratio_of(p, at);
   if (!(r.square > 0.0)) return;
-  const double length = std::hypot(r.gradient[0], r.gradient[1], r.gradient[2]);
+  const double length = std::sqrt(r.square + r.gradient_variance);
   maps.normal_x[at] = static_cast<float>(r.gradient[0] / length);
   maps.normal_y[at] = static_cast<float>(r.gradient[1] / length);
   maps.normal_z[at] = static_cast<float>(r.gradient[2] / length);

@@ -208,7 +208,7 @@ std::vector<float> depths(const StagePictures& p,
                           const Correction& correction,
                           double pixel_mm,
                           ThreadTeam& team) {
-  PixelValues values(p.width, p.height);
+  PixelValues values(p.width, p.height, team);
   std::vector<float> normal_z(values.measured.size(), 0.0F);
   int left = p.width;
   int right = 0;

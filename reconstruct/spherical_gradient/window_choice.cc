@@ -56,36 +56,58 @@ double sure_deviations(const PixelValues& values) {
   return std::sqrt(2.0 * std::log(std::max(10.0, static_cast<double>(count)))) + 0.5;
 }
 
-std::vector<WindowValues> choose_windows(const PixelValues& values,
-                                         const FlatRatios& flat,
-                                         const MapOptions& options,
-                                         ThreadTeam& team,
-                                         ScatteringMaps& maps) {
-  enum : std::uint8_t { kSettled = 1, kHasNormal = 2, kBoth = 3 };
-  std::vector<WindowValues> chosen(values.measured.size());
-  std::vector<std::uint8_t> state(values.measured.size(), 0);
-  const double sure = sure_deviations(values);
-  const double certain_of_normal = options.normal_certain * options.normal_certain;
-  for (const int half : options.half_windows) {
-    const auto wanted = [&](std::size_t at) { return state[at] != kBoth; };
-    for_each_window(values, half, wanted, team, [&](int x, int y, const WindowValues& window) {
-      const std::size_t at = values.index(x, y);
-      if ((state[at] & kHasNormal) == 0 && window.count >= 6) {
-        put_normal(window, at, maps);
-        if (window.normal_variance < certain_of_normal) state[at] |= kHasNormal;
-      }
-      if ((state[at] & kSettled) != 0) return;
-      if (!agrees(window, chosen[at], options.agree)) {
-        state[at] |= kSettled;
-        return;
-      }
-      chosen[at] = window;
-      if (is_certain(window, flat.at(window.reflectance), options.certain) ||
-          is_concave(window, sure))
-        state[at] |= kSettled;
+int WindowChooser::rows_of_band(const MapOptions& options) {
+  return WindowRows::side_of(options.half_windows.back());
+}
+
+WindowChooser::WindowChooser(const PixelValues& values,
+                             const FlatRatios& flat,
+                             const MapOptions& options,
+                             double sure,
+                             int begin,
+                             ScatteringMaps& maps)
+    : values_(values), flat_(flat), options_(options), maps_(maps), sure_(sure), row_(begin) {
+  for (const int half : options.half_windows) windows_.emplace_back(values, half, begin);
+}
+
+std::span<const WindowValues> WindowChooser::next() {
+  const int end = std::min(values_.height, row_ + rows_of_band(options_));
+  first_ = values_.index(0, row_);
+  const std::size_t count = values_.index(0, end) - first_;
+  chosen_.assign(count, {});
+  state_.assign(count, 0);
+  for (WindowRows& rows : windows_) look(rows, end);
+  row_ = end;
+  return chosen_;
+}
+
+void WindowChooser::look(WindowRows& rows, int end) {
+  const auto wanted = [this](std::size_t at) { return state_[at - first_] != kBoth; };
+  for (int top = row_; top < end; top += rows.side()) {
+    rows.advance();
+    rows.for_each(wanted, [this](int x, int y, const WindowValues& window) {
+      choose(window, values_.index(x, y));
     });
   }
-  return chosen;
+}
+
+void WindowChooser::choose(const WindowValues& window, std::size_t at) {
+  const double certain_of_normal = options_.normal_certain * options_.normal_certain;
+  std::uint8_t& state = state_[at - first_];
+  WindowValues& chosen = chosen_[at - first_];
+  if ((state & kHasNormal) == 0 && window.count >= 6) {
+    put_normal(window, at, maps_);
+    if (window.normal_variance < certain_of_normal) state |= kHasNormal;
+  }
+  if ((state & kSettled) != 0) return;
+  if (!agrees(window, chosen, options_.agree)) {
+    state |= kSettled;
+    return;
+  }
+  chosen = window;
+  if (is_certain(window, flat_.at(window.reflectance), options_.certain) ||
+      is_concave(window, sure_))
+    state |= kSettled;
 }
 
 }  // namespace opaline::reconstruct

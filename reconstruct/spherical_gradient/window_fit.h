@@ -21,7 +21,7 @@ struct PixelValues {
   std::vector<float> reflectance_variance;
   std::vector<std::uint8_t> measured;  ///< the others are left out of every sum
 
-  PixelValues(int w, int h);
+  PixelValues(int w, int h, ThreadTeam& team);
   std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * width + x; }
 };
 
@@ -48,15 +48,9 @@ struct WindowValues {
 
 /// Calls f(x, y, window) for the measured pixels, from several threads; `half` pixels on either side, clipped at the picture's edge. Sums slide, so the time
 /// does not depend on the window. From half = 8 on, pixels go by cells of half/4 (a power of two): those of a cell share their window, of whole cells, and differ
-/// in their place on its planes.
+/// in their place on its planes (window_rows.h).
 void for_each_window(const PixelValues& pixels,
                      int half,
-                     ThreadTeam& team,
-                     const std::function<void(int x, int y, const WindowValues& window)>& f);
-/// The same for the pixels that are wanted, by their index; the others cost less.
-void for_each_window(const PixelValues& pixels,
-                     int half,
-                     const std::function<bool(std::size_t at)>& wanted,
                      ThreadTeam& team,
                      const std::function<void(int x, int y, const WindowValues& window)>& f);
 

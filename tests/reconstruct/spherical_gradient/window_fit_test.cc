@@ -12,9 +12,12 @@ constexpr int kSize = 101;
 constexpr int kMiddle = 50;
 constexpr double kRadius = 60.0;  // pixels
 
+std::size_t index_of(int x, int y) { return static_cast<std::size_t>(y) * kSize + x; }
+
 /// A ball's normals, with Gaussian noise.
 PixelValues ball(double noise, unsigned seed = 1) {
-  PixelValues p(kSize, kSize);
+  ThreadTeam team(1);
+  PixelValues p(kSize, kSize, team);
   std::mt19937 random(seed);
   std::normal_distribution<double> gaussian(0.0, 1.0);
   for (int y = 0; y < kSize; ++y)
@@ -62,7 +65,7 @@ TEST(WindowFit, TellsACylinderFromABall) {
 
 TEST(WindowFit, NoiseMakesUnevennessNeitherLargerNorSmallerOnAverage) {
   constexpr int kDraws = 200;
-  const std::size_t middle = PixelValues(kSize, kSize).index(kMiddle, kMiddle);
+  const std::size_t middle = index_of(kMiddle, kMiddle);
   double sum = 0.0;
   double squares = 0.0;
   for (unsigned seed = 0; seed < kDraws; ++seed) {
@@ -75,7 +78,7 @@ TEST(WindowFit, NoiseMakesUnevennessNeitherLargerNorSmallerOnAverage) {
 
 TEST(WindowFit, StatesTheCurvaturesUncertainty) {
   constexpr int kDraws = 200;
-  const std::size_t middle = PixelValues(kSize, kSize).index(kMiddle, kMiddle);
+  const std::size_t middle = index_of(kMiddle, kMiddle);
   double squares = 0.0;
   double stated = 0.0;
   for (unsigned seed = 0; seed < kDraws; ++seed) {
@@ -87,7 +90,7 @@ TEST(WindowFit, StatesTheCurvaturesUncertainty) {
 }
 
 TEST(WindowFit, AMeanOfNPixelsIsSqrtOfNMoreCertain) {
-  const WindowValues w = windows(ball(0.0), 2)[PixelValues(kSize, kSize).index(50, 50)];
+  const WindowValues w = windows(ball(0.0), 2)[index_of(50, 50)];
   EXPECT_EQ(w.count, 25);
   EXPECT_NEAR(w.ratio, 1.5, 1e-9);
   EXPECT_NEAR(w.ratio_variance, 0.01 / 25.0, 1e-9);
