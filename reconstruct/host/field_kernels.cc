@@ -28,30 +28,19 @@ HWY_INLINE V load(const float* at) {
   return hn::PromoteTo(D(), hn::LoadU(hn::Rebind<float, D>(), at));
 }
 
-/// b - K x in the cells of the mask from i >= 1 on; those of `inner` have a cell after them.
-HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M inner) {
+/// b - K x in the cells of the mask; those of `later` have a cell before them, those of `inner` one after.
+HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M later, M inner) {
   const D d;
   const auto at = [&](const double* row) { return hn::MaskedLoad(cells, d, row + i); };
   V a = at(l.b);
   if (l.x == nullptr) return a;
   a = hn::NegMulAdd(at(l.diagonal), at(l.x), a);
-  a = hn::MulAdd(at(l.gx - 1), at(l.x - 1), a);
+  a = hn::MulAdd(hn::MaskedLoad(later, d, l.gx + i - 1), hn::MaskedLoad(later, d, l.x + i - 1), a);
   a = hn::MulAdd(at(l.gx), hn::MaskedLoad(inner, d, l.x + i + 1), a);
   if (l.y_before != nullptr) a = hn::MulAdd(at(l.gy_before), at(l.y_before), a);
   if (l.y_after != nullptr) a = hn::MulAdd(at(l.gy_after), at(l.y_after), a);
   if (l.z_before != nullptr) a = hn::MulAdd(at(l.gz_before), at(l.z_before), a);
   if (l.z_after != nullptr) a = hn::MulAdd(at(l.gz_after), at(l.z_after), a);
-  return a;
-}
-
-double residual_at_first(const FieldLine& l, int nx) {
-  if (l.x == nullptr) return l.b[0];
-  double a = l.b[0] - l.diagonal[0] * l.x[0];
-  if (nx > 1) a += l.gx[0] * l.x[1];
-  if (l.y_before != nullptr) a += l.gy_before[0] * l.y_before[0];
-  if (l.y_after != nullptr) a += l.gy_after[0] * l.y_after[0];
-  if (l.z_before != nullptr) a += l.gz_before[0] * l.z_before[0];
-  if (l.z_after != nullptr) a += l.gz_after[0] * l.z_after[0];
   return a;
 }
 
@@ -61,21 +50,21 @@ double residual(const FieldLine& line, double scale, T* r, int nx) {
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
   const V factor = hn::Set(d, scale);
-  const double first = residual_at_first(l, nx);
-  if (r != nullptr) r[0] = static_cast<T>(scale * first);
   V sum = hn::Zero(d);
   const M all = hn::FirstN(d, static_cast<std::size_t>(step));
-  for (int i = 1; i < nx; i += step) {
+  const M first = hn::FirstN(d, 1);
+  for (int i = 0; i < nx; i += step) {
     hwy::Prefetch(l.b + i + kAhead);
     if (l.z_after != nullptr) hwy::Prefetch(l.z_after + i + kAhead);
     const bool whole = i + step < nx;
     const M cells = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - i));
     const M inner = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - 1 - i));
-    const V a = residual_at(l, i, cells, inner);
+    const M later = i == 0 ? hn::AndNot(first, cells) : cells;
+    const V a = residual_at(l, i, cells, later, inner);
     sum = hn::MulAdd(a, a, sum);
     if (r != nullptr) store(hn::Mul(a, factor), r + i);
   }
-  return first * first + hn::GetLane(hn::SumOfLanes(d, sum));
+  return hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
 /// x = factor c, on top of what x was where it is kept.

@@ -65,6 +65,12 @@ class HostPasses {
     int end;
     bool has(int plane) const { return begin <= plane && plane < end; }
   };
+  /// Of a plane of the caller's fields.
+  struct Rows {
+    int begin;
+    int end;
+    int count() const { return end - begin; }
+  };
   /// Planes before, at and after, null outside the grid, and the cells that their rows begin at.
   struct Planes {
     const T* before;
@@ -121,10 +127,9 @@ class HostPasses {
   std::span<const double> residual_pass(bool keeps);
   void residual_slab(Slab slab, bool moves);
   void residual_ends(Slab slab);
-  void add_correction(int z, int thread);
-  void residual_plane(int z, int thread);
-  template <class F>
-  void for_rows(int thread, const F& f) const;
+  void add_correction(Rows rows, int z, int thread);
+  void residual_rows(Rows rows, int z, int thread);
+  int rows_at_once(int thread) const;
   FieldLine field_line(int m, int y, int z) const;
   std::size_t sums_at(int plane, std::size_t tile) const;
   void clear_sums(int plane, std::size_t tile);

@@ -4,6 +4,12 @@
 
 // The float64 part of HostPasses: x += d and r = b - K x, on the caller's fields.
 namespace opaline::reconstruct::host {
+namespace {
+
+constexpr std::size_t kBytesAtWork = 1280 << 10;  // of 2 MiB: four planes of x, one of all else
+constexpr std::size_t kFewestRows = 4;
+
+}  // namespace
 
 template <class T, class S>
 std::span<const double> HostPasses<T, S>::residual_pass(bool keeps) {
@@ -27,70 +33,79 @@ void HostPasses<T, S>::residual_slab(Slab slab, bool moves) {
   const auto waits = [&](int z) {  // for the x of other slabs
     return moves && !alone && (z == slab.begin || z == slab.end - 1);
   };
-  for (int z = slab.begin; z < slab.end + 1; ++z) {
-    if (moves && z < slab.end) add_correction(z, slab.thread);
-    if (z > slab.begin && !waits(z - 1)) residual_plane(z - 1, slab.thread);
+  const int step = rows_at_once(slab.thread);
+  for (int y = 0; y < grid_.ny; y += step) {
+    const bool last = y + step >= grid_.ny;
+    const Rows moved{y, last ? grid_.ny : y + step};
+    const Rows seen{std::max(0, moved.begin - 1), last ? grid_.ny : moved.end - 1};
+    for (int z = slab.begin; z < slab.end + 1; ++z) {
+      if (moves && z < slab.end) add_correction(moved, z, slab.thread);
+      if (z > slab.begin && !waits(z - 1)) residual_rows(seen, z - 1, slab.thread);
+    }
   }
 }
 
 template <class T, class S>
 void HostPasses<T, S>::residual_ends(Slab slab) {
-  residual_plane(slab.begin, slab.thread);
-  if (slab.end - 1 > slab.begin) residual_plane(slab.end - 1, slab.thread);
+  const int step = rows_at_once(slab.thread);
+  for (int z = slab.begin; z < slab.end; z += std::max(1, slab.end - 1 - slab.begin))
+    for (int y = 0; y < grid_.ny; y += step)
+      residual_rows({y, std::min(grid_.ny, y + step)}, z, slab.thread);
 }
 
 template <class T, class S>
-void HostPasses<T, S>::add_correction(int z, int thread) {
+void HostPasses<T, S>::add_correction(Rows rows, int z, int thread) {
   const std::array<T, 16> none{};
-  for_rows(thread, [&](int first, int count, T* fields, std::size_t line) {
-    for (int n = 0; n < count; ++n) {
-      const auto [j, k] = grid_.row_of(first + n, z);
-      fields_.to_fields(correction_ ? work_.d.row(j, k) : nullptr,
-                        work_.p.row(j, k),
-                        step_ ? step_length_.data() : none.data(),
-                        fields + n * line,
-                        line * count,
-                        width_,
-                        grid_.nx);
-    }
-    for (int m = 0; m < group_.count; ++m) {
-      if (scale_[m] == 0.0) continue;
-      double* x = group_.x.field(group_.first + m) + grid_.cell(first, z);
-      for (int n = 0; n < count; ++n)
-        (sets_ ? fields_.set : fields_.add)(
-            x + static_cast<std::ptrdiff_t>(n) * grid_.nx,
-            fields + (static_cast<std::size_t>(m) * count + n) * line,
-            1.0 / (scale_[m] * grid_.unit),
-            grid_.nx);
-    }
-  });
-}
-
-template <class T, class S>
-void HostPasses<T, S>::residual_plane(int z, int thread) {
-  double* sums = &work_.norm_sums[sums_at(z, 0)];
-  for_rows(thread, [&](int first, int count, T* fields, std::size_t line) {
-    for (int m = 0; m < group_.count; ++m)
-      for (int n = 0; n < count; ++n)
-        sums[m] += fields_.residual(
-            field_line(m, first + n, z),
-            scale_[m] * growth_[m],
-            keeps_ ? fields + (static_cast<std::size_t>(m) * count + n) * line : nullptr,
-            grid_.nx);
-    for (int n = 0; keeps_ && n < count; ++n) {
-      const auto [j, k] = grid_.row_of(first + n, z);
-      fields_.to_lanes(fields + n * line, line * count, work_.r[0].row(j, k), width_, grid_.nx);
-    }
-  });
-}
-
-template <class T, class S>
-template <class F>
-void HostPasses<T, S>::for_rows(int thread, const F& f) const {
   const std::size_t line = padded(grid_.nx);
-  std::vector<T>& fields = work_.fields[thread];
-  const auto most = static_cast<int>(fields.size() / (line * width_));
-  for (int y = 0; y < grid_.ny; y += most) f(y, std::min(most, grid_.ny - y), fields.data(), line);
+  T* fields = work_.fields[thread].data();
+  for (int n = 0; n < rows.count(); ++n) {
+    const auto [j, k] = grid_.row_of(rows.begin + n, z);
+    fields_.to_fields(correction_ ? work_.d.row(j, k) : nullptr,
+                      work_.p.row(j, k),
+                      step_ ? step_length_.data() : none.data(),
+                      fields + n * line,
+                      line * rows.count(),
+                      width_,
+                      grid_.nx);
+  }
+  for (int m = 0; m < group_.count; ++m) {
+    if (scale_[m] == 0.0) continue;
+    double* x = group_.x.field(group_.first + m) + grid_.cell(rows.begin, z);
+    for (int n = 0; n < rows.count(); ++n)
+      (sets_ ? fields_.set : fields_.add)(
+          x + static_cast<std::ptrdiff_t>(n) * grid_.nx,
+          fields + (static_cast<std::size_t>(m) * rows.count() + n) * line,
+          1.0 / (scale_[m] * grid_.unit),
+          grid_.nx);
+  }
+}
+
+template <class T, class S>
+void HostPasses<T, S>::residual_rows(Rows rows, int z, int thread) {
+  const std::size_t line = padded(grid_.nx);
+  T* fields = work_.fields[thread].data();
+  double* sums = &work_.norm_sums[sums_at(z, 0)];
+  for (int m = 0; m < group_.count; ++m)
+    for (int n = 0; n < rows.count(); ++n)
+      sums[m] += fields_.residual(
+          field_line(m, rows.begin + n, z),
+          scale_[m] * growth_[m],
+          keeps_ ? fields + (static_cast<std::size_t>(m) * rows.count() + n) * line : nullptr,
+          grid_.nx);
+  for (int n = 0; keeps_ && n < rows.count(); ++n) {
+    const auto [j, k] = grid_.row_of(rows.begin + n, z);
+    fields_.to_lanes(
+        fields + n * line, line * rows.count(), work_.r[0].row(j, k), width_, grid_.nx);
+  }
+}
+
+template <class T, class S>
+int HostPasses<T, S>::rows_at_once(int thread) const {
+  constexpr std::size_t kBytesPerCell = 4 * sizeof(double) + sizeof(double) + 4 * sizeof(T);
+  const std::size_t row = static_cast<std::size_t>(grid_.nx) * width_ * kBytesPerCell;
+  const std::size_t most = work_.fields[thread].size() / (padded(grid_.nx) * width_);
+  const std::size_t rows = std::max<std::size_t>(kFewestRows, kBytesAtWork / row);
+  return static_cast<int>(std::min(rows, most - 1));
 }
 
 template <class T, class S>

@@ -82,7 +82,7 @@ Workspace<T, S>::Workspace(const HostGrid<T>& grid, int lanes, int threads)
     halo.emplace_back(finest.nx, finest.ni, 2, lanes);
   const std::size_t line = padded(finest.nx) * lanes;
   fields.assign(parts_.front(),
-                std::vector<T>(line * std::max<std::size_t>(1, kFieldNumbers / line), T{0}));
+                std::vector<T>(line * std::max<std::size_t>(2, kFieldNumbers / line), T{0}));
   const std::size_t row = (static_cast<std::size_t>(finest.nx) + 3) * lanes;
   zeros.assign(row, T{0});
   stored_zeros.assign(row, S{});
