@@ -195,4 +195,10 @@ std::vector<double> prolonged(const Block& from, const Block& to, std::span<cons
   return transferred(for_axes(from, to, interpolations), from, values);
 }
 
+long solves_on_finer(const Block& coarse, const Block& fine, long solves) {
+  return std::lround(
+      std::ceil(static_cast<double>(solves) * static_cast<double>(coarse.cell_count()) /
+                static_cast<double>(fine.cell_count())));
+}
+
 }  // namespace opaline::reconstruct

@@ -20,6 +20,9 @@ std::optional<Block> coarser_block(const Block& block);
 /// coarse grid's own error is larger.
 ChannelProblem coarsened(const ChannelProblem& problem, const Block& coarse);
 
+/// As many solves on `fine` as cost what `solves` on `coarse` do, by their cells, rounded up.
+long solves_on_finer(const Block& coarse, const Block& fine, long solves);
+
 /// Means over the volume of each cell of `to` of values on the cells of `from`, a grid of the same block.
 std::vector<double> restricted(const Block& from, const Block& to, std::span<const double> values);
 

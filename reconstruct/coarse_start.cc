@@ -53,12 +53,6 @@ std::deque<CurvaturePair> prolonged_pairs(const Block& coarse,
   return out;
 }
 
-long fine_solves(const Block& coarse, const Block& fine, long solves) {
-  return std::lround(
-      std::ceil(static_cast<double>(solves) * static_cast<double>(coarse.cell_count()) /
-                static_cast<double>(fine.cell_count())));
-}
-
 }  // namespace
 
 Result<WarmStart> coarse_start(const ChannelProblem& problem,
@@ -84,7 +78,7 @@ Result<WarmStart> coarse_start(const ChannelProblem& problem,
   auto progress = below.run(std::nullopt, std::move(stop));
   if (!progress)
     return progress.error().in(fmt::format("{} x {} x {} cells", coarse.nx, coarse.ny, coarse.nz));
-  const long solves = fine_solves(coarse, fine, progress->report.solves);
+  const long solves = solves_on_finer(coarse, fine, progress->report.solves);
   if (from && progress->report.history.back().iteration == 0) {
     WarmStart warm = *from;
     warm.solves += solves;

@@ -8,7 +8,9 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <optional>
 
+#include "reconstruct/coarse_grid.h"
 #include "reconstruct/illumination_subset.h"
 
 namespace opaline::reconstruct {
@@ -20,9 +22,14 @@ constexpr int kMaxIterations = 20;
 constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
-constexpr double kConverged = 1e-3;       // change of the logarithms
-constexpr std::size_t kFew = 4;           // illuminations that two numbers are found from
-constexpr double kUnexplained = 0.25;     // of the data's power
+constexpr double kConverged = 1e-3;  // change of the logarithms
+constexpr double kNoMove =
+    2e-3;                        // of them: where it leads nowhere the solves' tolerance is reached
+constexpr std::size_t kFew = 4;  // illuminations that two numbers are found from
+constexpr double kUnexplained = 0.25;        // of the data's power
+constexpr std::size_t kSketchCells = 20000;  // the largest grid that a start is sought on
+constexpr double kSecant =
+    0.3;  // a move of the logarithms after which the slopes are worth keeping
 constexpr double kTwoSided95 = 1.959964;  // of the normal distribution
 
 // sqrt(w) dL/d(log sigma_s', sigma_a), a row a datum.
@@ -115,6 +122,10 @@ class Fit {
     return best;
   }
 
+  bool explains(const HomogeneousFit& fit) const {
+    return fit.chi_squared < kUnexplained * power();
+  }
+
   // The chi^2 of darkness.
   double power() const {
     double sum = 0.0;
@@ -127,17 +138,18 @@ class Fit {
   Result<HomogeneousFit> from(Logs logs) {
     auto r = residuals(logs);
     if (!r) return r.error();
-    double damping = 1e-3;
+    State at{logs, *std::move(r)};
     int iteration = 0;
     while (iteration < kMaxIterations) {
       ++iteration;
-      const auto moved = step(logs, *r, damping);
+      const auto moved = step(at);
       if (!moved) return moved.error();
       if (*moved < kConverged) break;
+      if (*moved > kSecant) at.slopes.reset();
     }
-    return HomogeneousFit{.reduced_scattering = std::exp(logs[0]),
-                          .absorption = std::exp(logs[1]),
-                          .chi_squared = r->squaredNorm(),
+    return HomogeneousFit{.reduced_scattering = std::exp(at.logs[0]),
+                          .absorption = std::exp(at.logs[1]),
+                          .chi_squared = at.r.squaredNorm(),
                           .iterations = iteration,
                           .solves = objective_.solves(),
                           .reduced_scattering_interval = {},
@@ -202,32 +214,51 @@ class Fit {
     return columns;
   }
 
+  // A point of the way, and the slopes there where they are known.
+  struct State {
+    Logs logs;
+    Eigen::VectorXd r;
+    double damping = 1e-3;
+    std::optional<Slopes> slopes = std::nullopt;
+  };
+
   // One Levenberg-Marquardt step; returns how far the logarithms moved, 0 when nothing lower was
-  // found.
-  Result<double> step(Logs& logs, Eigen::VectorXd& r, double& damping) {
-    const auto slopes = jacobian(logs, r.size());
-    if (!slopes) return slopes.error();
-    const Eigen::Matrix2d normal = slopes->transpose() * *slopes;
-    const Logs gradient = slopes->transpose() * r;
-    for (int attempt = 0; attempt < kMaxDampings; ++attempt) {
+  // found. Slopes that are kept are those of before with what the step itself has shown (Broyden 1965, Math. Comput.
+  // 19, Eq. 4.5); where they lead nowhere they are taken afresh.
+  Result<double> step(State& at) {
+    const bool kept = at.slopes.has_value();
+    if (!kept) {
+      auto slopes = jacobian(at.logs, at.r.size());
+      if (!slopes) return slopes.error();
+      at.slopes = *std::move(slopes);
+    }
+    const Eigen::Matrix2d normal = at.slopes->transpose() * *at.slopes;
+    const Logs gradient = at.slopes->transpose() * at.r;
+    for (int attempt = 0; attempt < (kept ? 1 : kMaxDampings); ++attempt) {
       Eigen::Matrix2d damped = normal;
-      damped.diagonal() *= 1.0 + damping;
+      damped.diagonal() *= 1.0 + at.damping;
       damped.diagonal().array() += 1e-12 * normal.trace();
       const Logs move = (-damped.inverse() * gradient).cwiseMax(-1.5).cwiseMin(1.5);
-      const Logs next = bounded(logs + move);
+      const Logs next = bounded(at.logs + move);
       auto there = residuals(next);
       if (!there) return there.error();
-      if (there->squaredNorm() >= r.squaredNorm()) {
-        damping *= 10.0;
-        continue;
-      }
-      const double moved = (next - logs).cwiseAbs().maxCoeff();
-      logs = next;
-      r = *std::move(there);
-      damping = std::max(0.1 * damping, 1e-6);
-      return moved;
+      if (there->squaredNorm() < at.r.squaredNorm()) return take(at, next, *std::move(there));
+      if (move.cwiseAbs().maxCoeff() < kNoMove) return 0.0;
+      at.damping *= 10.0;
     }
-    return 0.0;
+    if (!kept) return 0.0;
+    at.slopes.reset();
+    return step(at);
+  }
+
+  static double take(State& at, const Logs& next, Eigen::VectorXd there) {
+    const Logs moved = next - at.logs;
+    const Eigen::VectorXd unforeseen = there - at.r - *at.slopes * moved;
+    *at.slopes += unforeseen * moved.transpose() / moved.squaredNorm();
+    at.logs = next;
+    at.r = std::move(there);
+    at.damping = std::max(0.1 * at.damping, 1e-6);
+    return moved.cwiseAbs().maxCoeff();
   }
 
   const ChannelProblem& problem_;
@@ -242,13 +273,36 @@ Result<HomogeneousFit> sketched(Fit& sketch) {
   const auto slab = sketch.start({2.0, 6.0, 18.0, 60.0});
   if (!slab) return slab.error();
   auto fit = sketch.from(*slab);
-  if (!fit || fit->chi_squared < kUnexplained * sketch.power()) return fit;
+  if (!fit || sketch.explains(*fit)) return fit;
   const auto film = sketch.start({0.02, 0.1, 0.5});
   if (!film) return film.error();
   auto thinner = sketch.from(*film);
   if (!thinner || thinner->chi_squared < fit->chi_squared) return thinner;
   fit->solves = thinner->solves;  // counted by the sketch
   return fit;
+}
+
+Logs logs_of(double reduced_scattering, double absorption) {
+  return {std::log(reduced_scattering), std::log(absorption)};
+}
+
+// From a grid of half as many cells along each axis, where there are many, and so on down.
+Result<HomogeneousFit> fit_down_to(const ChannelProblem& problem,
+                                   const InverseOptions& options,
+                                   diffusion::FluenceSolver& solver,
+                                   const std::stop_token& stop) {
+  Fit fit(problem, options, solver, stop);
+  if (const auto& start = problem.start)
+    return fit.from(fit.bounded(logs_of(start->reduced_scattering, start->absorption)));
+  const auto coarse =
+      problem.block.cell_count() > kSketchCells ? coarser_block(problem.block) : std::nullopt;
+  if (!coarse) return sketched(fit);
+  const auto below = fit_down_to(coarsened(problem, *coarse), options, solver, stop);
+  if (!below) return below;
+  auto found = fit.from(logs_of(below->reduced_scattering, below->absorption));
+  if (found && !fit.explains(*found)) found = sketched(fit);
+  if (found) found->solves += solves_on_finer(*coarse, problem.block, below->solves);
+  return found;
 }
 
 }  // namespace
@@ -258,11 +312,7 @@ Result<HomogeneousFit> fit_homogeneous(const ChannelProblem& problem,
                                        diffusion::FluenceSolver& solver,
                                        std::stop_token stop) {
   const ChannelProblem few = with_illuminations(problem, few_illuminations(problem, kFew));
-  Fit sketch(few, options, solver, stop);
-  auto fit = problem.start
-                 ? sketch.from(sketch.bounded({std::log(problem.start->reduced_scattering),
-                                               std::log(problem.start->absorption)}))
-                 : sketched(sketch);
+  auto fit = fit_down_to(few, options, solver, stop);
   if (!fit || options.max_iterations > 0) return fit;
   return refine_homogeneous(problem, options, *fit, solver, std::move(stop));
 }
@@ -273,7 +323,7 @@ Result<HomogeneousFit> refine_homogeneous(const ChannelProblem& problem,
                                           diffusion::FluenceSolver& solver,
                                           std::stop_token stop) {
   Fit all(problem, options, solver, std::move(stop));
-  auto fit = all.from({std::log(start.reduced_scattering), std::log(start.absorption)});
+  auto fit = all.from(logs_of(start.reduced_scattering, start.absorption));
   if (!fit) return fit;
   if (auto added = all.add_intervals(*fit, options.model_error); !added) return added.error();
   fit->solves += start.solves;

@@ -29,8 +29,8 @@ struct HomogeneousFit {
 };
 
 /// Fits (log sigma_s', log sigma_a) of a homogeneous block by Levenberg-Marquardt with central
-/// differences, from ChannelProblem::start or the best of a coarse table of optical thicknesses and albedos. Two numbers
-/// need few pictures: four of the illuminations, spread over all of them, lead to the start of
+/// differences, from ChannelProblem::start or the best of a coarse table of optical thicknesses and albedos, which is
+/// sought on a coarser grid of the block where there are many cells. Two numbers need few pictures: four of the illuminations, spread over all of them, lead to the start of
 /// another fit; refine_homogeneous() has the last word where the homogeneous sample is the answer, as it is with
 /// max_iterations = 0. Absorption that the pictures cannot tell from none stays at its lower bound.
 /// Errors: the objective's.

@@ -34,7 +34,8 @@ ChannelProblem with_illuminations(const ChannelProblem& problem,
                       .rays = problem.rays,
                       .illuminations = {},
                       .data_count = 0,
-                      .noise = 0.0};
+                      .noise = 0.0,
+                      .start = problem.start};
   for (const std::size_t m : chosen) {
     some.illuminations.push_back(problem.illuminations[m]);
     some.data_count += data_of(some.illuminations.back());

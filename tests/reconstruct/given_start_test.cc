@@ -7,6 +7,7 @@
 
 #include "reconstruct/diffusion/reference_solver.h"
 #include "reconstruct/homogeneous_fit.h"
+#include "reconstruct/illumination_subset.h"
 #include "tests/support/synthetic_dataset.h"
 
 namespace opaline::reconstruct {
@@ -49,6 +50,11 @@ TEST_F(GivenStart, AnEstimateWithinFifteenPercentNeedsFewerSolvesThanNone) {
   }
   std::printf("solves: %ld without a start, at most %ld with one\n", cold.solves, most);
   EXPECT_LT(most, cold.solves);
+}
+
+TEST_F(GivenStart, GoesWithThePicturesThatAreTakenOut) {
+  problem_.start = StartCoefficients{1.0, 0.01};
+  EXPECT_TRUE(with_illuminations(problem_, {0, 1}).start);
 }
 
 TEST_F(GivenStart, AWrongOneOnlyCostsSolves) {

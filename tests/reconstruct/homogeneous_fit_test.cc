@@ -86,6 +86,47 @@ class Experiment {
   std::vector<std::vector<double>> exact_;
 };
 
+// The data are the fine grid's own, so its minimum is the truth; cells twice as long in each direction have another.
+TEST(HomogeneousFit, EndsAtTheMinimumOfAFineGridWithFewSolvesOnIt) {
+  const InverseOptions options;
+  Dataset dataset = testing_support::make_synthetic_dataset(
+      {.block = {9, 9, 6, 2.0, 2.0, 2.0}, .regions = 2, .noise = 0.01, .heterogeneous = false});
+  dataset.block = {36, 36, 18, 0.5, 0.5, 0.5};
+  dataset.view_cosine = Image<float>(36, 36, 1, 1.0F);
+  for (Illumination& i : dataset.illuminations) {
+    Image<float> irradiance(36, 36, kColorChannels);
+    for (int y = 0; y < 36; ++y)
+      for (int x = 0; x < 36; ++x) irradiance.at(x, y, 0) = i.irradiance.at(x / 4, y / 4, 0);
+    i.irradiance = std::move(irradiance);
+    i.radiance = Image<float>(36, 36, kColorChannels, 1.0F);
+    i.radiance_variance = Image<float>(36, 36, kColorChannels, 1.0F);
+    i.mask = Image<std::uint8_t>(36, 36, 1, 1);
+  }
+  auto problem = make_channel_problem(dataset, 0, options, Selection::kFit);
+  ASSERT_TRUE(problem) << problem.error().message;
+  const auto solver = diffusion::make_reference_solver();
+  const Truth truth;
+  const std::size_t cells = problem->block.cell_count();
+  const auto exact = Objective(*problem, *solver, {1e-8, 0.0})
+                         .predict({std::vector<double>(cells, truth.absorption),
+                                   std::vector<double>(cells, truth.reduced_scattering)},
+                                  {});
+  ASSERT_TRUE(exact) << exact.error().message;
+  for (std::size_t m = 0; m < exact->size(); ++m) {
+    ChannelIllumination& data = problem->illuminations[m];
+    data.radiance = (*exact)[m];
+    for (std::size_t x = 0; x < data.weight.size(); ++x)
+      data.weight[x] = std::pow(0.02 * data.radiance[x], -2.0);
+  }
+
+  const auto fit = fit_homogeneous(*problem, options, *solver, {});
+
+  ASSERT_TRUE(fit) << fit.error().message;
+  EXPECT_NEAR(fit->reduced_scattering / truth.reduced_scattering, 1.0, 2e-3);
+  EXPECT_NEAR(fit->absorption / truth.absorption, 1.0, 4e-3);
+  EXPECT_LT(fit->solves, 4 * 16);  // what the table of starts alone takes
+}
+
 // 120 draws of probability 0.95: 0.90 to 0.99 is two and a half standard deviations below and two above.
 TEST(HomogeneousFit, HoldsTheTruthIn95Of100IntervalsUnderNoise) {
   const auto share = Experiment({}, 0.0).coverage();
