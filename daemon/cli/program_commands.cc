@@ -39,8 +39,12 @@ void ProgramCommands::declare_render(CLI::App& app,
                                      const std::filesystem::path& programs,
                                      int& status) {
   CLI::App* sub = app.add_subcommand(
-      "render", "Draw a scene of translucent and opaque objects, without a daemon");
-  sub->add_option("SCENE", render_.scene, "scene.toml (docs/rendering.md)")->required();
+      "render",
+      "Draw a scene of translucent and opaque objects, or a session's maps, without a daemon");
+  sub->add_option("SCENE",
+                  render_.scene,
+                  "scene.toml (docs/rendering.md), or a session in a sphere of lights: its maps")
+      ->required();
   sub->add_option("--output,-o", render_.outputs, "Picture: .png, .tif or .exr; may be given again")
       ->required();
   sub->add_option("--turntable",
@@ -61,6 +65,17 @@ void ProgramCommands::declare_render(CLI::App& app,
   sub->add_flag("--swing",
                 render_.swing,
                 "Over a turntable objects bend from rest to where the scene has them, and back");
+  sub->add_option(
+         "--light", render_.light, "Of a session: constant, gradient_x, gradient_y or gradient_z")
+      ->capture_default_str();
+  sub->add_option("--turn", render_.turn_deg, "Of a session: degrees to the right");
+  sub->add_option("--tilt", render_.tilt_deg, "Of a session: degrees up");
+  sub->add_option("--mesh",
+                  render_.mesh,
+                  "Of a session: OBJ with texture coordinates over the picture, in place of it");
+  sub->add_option(
+         "--mesh-size", render_.mesh_size_mm, "Its largest extent, mm; 0: its coordinates are mm")
+      ->check(CLI::Range(0.0, 1e6));
   sub->add_option("--threads", render_.threads, "0: one a processor")->check(CLI::Range(0, 1024));
   sub->footer(
       "Ctrl-C stops; a picture is there whole or not at all.\n"
@@ -69,7 +84,9 @@ void ProgramCommands::declare_render(CLI::App& app,
       "  opaline render scene.toml --output frame.png --output frame.exr --turntable 60\n"
       "  opaline render scene.toml --output picture.png --stats picture.json\n"
       "  opaline render scene.toml --output bend.png --turntable 24 --swing\n"
-      "  opaline render scene.toml --output after.png --save-material ring=painted.vdb");
+      "  opaline render scene.toml --output after.png --save-material ring=painted.vdb\n"
+      "  opaline render SESSION --output maps.png --light gradient_x\n"
+      "  opaline render SESSION --output turned.png --turn 35");
   sub->callback([this, &programs, &status] { status = report(become_render(programs, render_)); });
 }
 
@@ -77,8 +94,13 @@ void ProgramCommands::declare_view(CLI::App& app,
                                    const std::filesystem::path& programs,
                                    int& status) {
   CLI::App* sub = app.add_subcommand(
-      "view", "Open a window on a scene: light it, paint into it, bend it, without a daemon");
-  sub->add_option("SCENE", view_.scene, "scene.toml (docs/rendering.md)")->required();
+      "view",
+      "Open a window on a scene: light it, paint into it, bend it; or on a session's maps beside "
+      "what was captured; without a daemon");
+  sub->add_option("SCENE",
+                  view_.scene,
+                  "scene.toml (docs/rendering.md), or a session in a sphere of lights: its maps")
+      ->required();
   sub->add_option("--do", view_.actions, "Does this, one thing a picture; may be given again");
   sub->add_option("--frames", view_.frames, "Ends after this many pictures")
       ->check(CLI::Range(0, 1'000'000));
@@ -93,7 +115,8 @@ void ProgramCommands::declare_view(CLI::App& app,
       "  opaline view config/scene_marble_torus.toml\n"
       "  opaline view scene.toml --do 'brush radius 2' --do 'paint 0.5 0.6' --do 'screenshot "
       "a.png'\n"
-      "  opaline view scene.toml --frames 5 --screenshot window.png");
+      "  opaline view scene.toml --frames 5 --screenshot window.png\n"
+      "  opaline view SESSION --do 'light 0 90 0' --do 'orbit 30 0' --screenshot turned.png");
   sub->callback([this, &programs, &status] { status = report(become_view(programs, view_)); });
 }
 

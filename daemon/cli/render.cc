@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "daemon/cli/become.h"
 
 namespace opaline::daemon {
@@ -21,6 +23,12 @@ Error become_render(const std::filesystem::path& programs, const RenderWish& wis
   if (wish.no_edits) words.emplace_back("--no-edits");
   if (wish.at_rest) words.emplace_back("--at-rest");
   if (wish.swing) words.emplace_back("--swing");
+  words.insert(words.end(), {"--light", wish.light});
+  for (const auto& [name, value] : {std::pair{"--turn", wish.turn_deg},
+                                    {"--tilt", wish.tilt_deg},
+                                    {"--mesh-size", wish.mesh_size_mm}})
+    words.push_back(fmt::format("{}={}", name, value));
+  if (!wish.mesh.empty()) words.insert(words.end(), {"--mesh", wish.mesh});
   words.insert(words.end(), {"--", wish.scene});
   return become(programs, "opaline-render", words);
 }

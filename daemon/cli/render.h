@@ -19,8 +19,13 @@ struct RenderWish {
   std::string draw = "host";           ///< or vulkan
   std::string device;                  ///< part of a Vulkan device's name; empty: the best
   bool no_edits = false;
-  bool at_rest = false;  ///< without bending
-  bool swing = false;    ///< bends over a turntable
+  bool at_rest = false;            ///< without bending
+  bool swing = false;              ///< bends over a turntable
+  std::string light = "constant";  ///< of a session's maps, as the rest
+  double turn_deg = 0.0;
+  double tilt_deg = 0.0;
+  std::string mesh;
+  double mesh_size_mm = 0.0;
 };
 
 /// Becomes `programs`/opaline-render. Errors: kUnavailable when the program is not there.

@@ -21,8 +21,10 @@
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
 #include "daemon/render/developed_picture.h"
+#include "daemon/render/maps_picture.h"
 #include "daemon/render/render_report.h"
 #include "daemon/render/turntable.h"
+#include "daemon/scattering/maps_scene.h"
 #include "render/raster/raster_renderer.h"
 #include "render/scene/scene_renderer.h"
 
@@ -44,6 +46,7 @@ struct Arguments {
   bool at_rest = false;
   bool swing = false;
   int threads = 0;
+  MapsPictureOptions maps;  // where SCENE is a session's directory
 };
 
 struct Output {
@@ -197,9 +200,33 @@ class Session {
   double white_ = 1.0;
 };
 
+/// A session's maps in place of a scene.
+Result<void> run_maps(const Arguments& arguments) {
+  MapsPictureOptions options = arguments.maps;
+  options.session = arguments.scene;
+  options.outputs = arguments.outputs;
+  options.turntable = arguments.turntable;
+  if (!arguments.stats.empty() || !arguments.materials.empty() || arguments.draw != "host" ||
+      arguments.no_edits || arguments.at_rest || arguments.swing)
+    return invalid_argument(
+        "--stats, --draw, --save-material, --no-edits, --at-rest and --swing are of scenes; this "
+        "is a session: give its scene.toml");
+  std::stop_source stop;
+  const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
+  if (!signals) return signals.error();
+  return draw_maps(
+      options,
+      [](const fs::path& file) { fmt::print("picture  {}\n", file.string()); },
+      stop.get_token());
+}
+
 Result<void> run(const Arguments& arguments) {
   auto outputs = outputs_of(arguments);
   if (!outputs) return outputs.error();
+  if (is_session_directory(arguments.scene)) return run_maps(arguments);
+  if (arguments.maps.is_asked_for())
+    return invalid_argument(
+        "--light, --turn, --tilt, --mesh and --mesh-size are of a session's maps; this is a scene");
   auto scene = config::load_scene(arguments.scene);
   if (!scene) return scene.error();
   for (render::ObjectOptions& object : scene->objects) {
@@ -220,7 +247,10 @@ Result<void> run(const Arguments& arguments) {
 int program(int argc, char** argv) {
   CLI::App app("Draws a scene of translucent and opaque objects.");
   Arguments arguments;
-  app.add_option("SCENE", arguments.scene, "scene.toml (docs/rendering.md)")->required();
+  app.add_option("SCENE",
+                 arguments.scene,
+                 "scene.toml (docs/rendering.md), or a session in a sphere of lights: its maps")
+      ->required();
   app.add_option(
          "--output,-o", arguments.outputs, "Picture: .png, .tif or .exr; may be given again")
       ->required();
@@ -243,6 +273,19 @@ int program(int argc, char** argv) {
   app.add_flag("--swing",
                arguments.swing,
                "Over a turntable objects bend from rest to where the scene has them, and back");
+  app.add_option("--light",
+                 arguments.maps.light,
+                 "Of a session: constant, gradient_x, gradient_y or gradient_z")
+      ->capture_default_str();
+  app.add_option("--turn", arguments.maps.turn_deg, "Of a session: degrees to the right");
+  app.add_option("--tilt", arguments.maps.tilt_deg, "Of a session: degrees up");
+  app.add_option("--mesh",
+                 arguments.maps.mesh,
+                 "Of a session: OBJ with texture coordinates over the picture, in place of it");
+  app.add_option("--mesh-size",
+                 arguments.maps.mesh_size_mm,
+                 "Its largest extent, mm; 0: its coordinates are mm")
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("--threads", arguments.threads, "0: one a processor")->check(CLI::Range(0, 1024));
   app.footer(
       "Ctrl-C stops; a picture is there whole or not at all.\n"
@@ -250,7 +293,9 @@ int program(int argc, char** argv) {
       "  opaline-render config/scene_marble_torus.toml --output torus.png\n"
       "  opaline-render scene.toml --output frame.png --output frame.exr --turntable 60\n"
       "  opaline-render scene.toml --output bend.png --turntable 24 --swing\n"
-      "  opaline-render scene.toml --output after.png --save-material ring=painted.vdb");
+      "  opaline-render scene.toml --output after.png --save-material ring=painted.vdb\n"
+      "  opaline-render SESSION --output maps.png --light gradient_x\n"
+      "  opaline-render SESSION --output turned.png --turn 35");
   return run_command(app, "opaline-render", argc, argv, [&] { return run(arguments); });
 }
 

@@ -14,27 +14,6 @@ namespace {
 
 constexpr double kSteepestTexel = 0.2;  // n_z below which a texel's area is not believed
 
-render::TexelSurface seen_surface(const SphereMaps& maps, const Relief& r) {
-  const std::size_t count = r.height_mm.size();
-  render::TexelSurface s{.width = r.width, .height = r.height, .texel_mm = r.cell_mm};
-  s.position.resize(count);
-  s.normal.resize(count);
-  s.area.assign(count, 0.0F);
-  s.covered.assign(count, 0);
-  const Image<float> normals = mean_normals(maps);
-  for (int y = 0; y < r.height; ++y)
-    for (int x = 0; x < r.width; ++x) {
-      if (!r.has(x, y)) continue;
-      const auto at = static_cast<std::size_t>(y * r.width + x);
-      const auto n = [&](int k) -> double { return normals.at(x * r.step, y * r.step, k); };
-      s.position[at] = {(x + 0.5) * r.cell_mm, (y + 0.5) * r.cell_mm, r.at(x, y)};
-      s.normal[at] = {n(0), n(1), n(2)};
-      s.area[at] = static_cast<float>(r.cell_mm * r.cell_mm / std::max(kSteepestTexel, n(2)));
-      s.covered[at] = 1;
-    }
-  return s;
-}
-
 /// The light of a pattern over that of the constant one; the picture it is compared with.
 struct Pattern {
   const char* name = "";
@@ -63,7 +42,35 @@ void compare(DipoleView& view) {
   view.scale = rendered / captured;
 }
 
+void put(const Image<float>& from, int left, Image<float>& all) {
+  const int top = (all.height() - from.height()) / 2;
+  for (int y = 0; y < from.height(); ++y)
+    for (int x = 0; x < from.width(); ++x)
+      for (int k = 0; k < 3; ++k) all.at(left + x, top + y, k) = from.at(x, y, k);
+}
+
 }  // namespace
+
+render::TexelSurface seen_surface(const SphereMaps& maps, const Relief& r) {
+  const std::size_t count = r.height_mm.size();
+  render::TexelSurface s{.width = r.width, .height = r.height, .texel_mm = r.cell_mm};
+  s.position.resize(count);
+  s.normal.resize(count);
+  s.area.assign(count, 0.0F);
+  s.covered.assign(count, 0);
+  const Image<float> normals = mean_normals(maps);
+  for (int y = 0; y < r.height; ++y)
+    for (int x = 0; x < r.width; ++x) {
+      if (!r.has(x, y)) continue;
+      const auto at = static_cast<std::size_t>(y * r.width + x);
+      const auto n = [&](int k) -> double { return normals.at(x * r.step, y * r.step, k); };
+      s.position[at] = {(x + 0.5) * r.cell_mm, (y + 0.5) * r.cell_mm, r.at(x, y)};
+      s.normal[at] = {n(0), n(1), n(2)};
+      s.area[at] = static_cast<float>(r.cell_mm * r.cell_mm / std::max(kSteepestTexel, n(2)));
+      s.covered[at] = 1;
+    }
+  return s;
+}
 
 Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
                                              const SphereSession& session,
@@ -119,14 +126,19 @@ Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
   return views;
 }
 
-Image<float> side_by_side(const DipoleView& view, int times) {
-  const int width = view.captured.width();
-  Image<float> both(2 * width * times, view.captured.height() * times, 3);
-  for (int y = 0; y < both.height(); ++y)
-    for (int x = 0; x < both.width(); ++x) {
-      const Image<float>& from = x / times < width ? view.captured : view.rendered;
-      for (int k = 0; k < 3; ++k) both.at(x, y, k) = from.at(x / times % width, y / times, k);
-    }
+Image<float> enlarged(const Image<float>& picture, int times) {
+  Image<float> large(picture.width() * times, picture.height() * times, picture.channels());
+  for (int y = 0; y < large.height(); ++y)
+    for (int x = 0; x < large.width(); ++x)
+      for (int k = 0; k < large.channels(); ++k)
+        large.at(x, y, k) = picture.at(x / times, y / times, k);
+  return large;
+}
+
+Image<float> beside(const Image<float>& left, const Image<float>& right) {
+  Image<float> both(left.width() + right.width(), std::max(left.height(), right.height()), 3);
+  put(left, 0, both);
+  put(right, left.width(), both);
   return both;
 }
 

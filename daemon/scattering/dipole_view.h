@@ -7,6 +7,7 @@
 #include "base/result.h"
 #include "daemon/scattering/relief.h"
 #include "daemon/scattering/sphere_maps.h"
+#include "render/dipole/texture_diffusion.h"
 
 namespace opaline::daemon {
 
@@ -27,7 +28,12 @@ Result<std::vector<DipoleView>> dipole_views(const SphereMaps& maps,
                                              double ior,
                                              std::stop_token stop);
 
-/// Captured on the left, rendered on the right, each place enlarged `times`.
-Image<float> side_by_side(const DipoleView& view, int times);
+/// The seen surface as texels of the relief's places, x along a row, y down a column, z towards the camera; without its maps.
+render::TexelSurface seen_surface(const SphereMaps& maps, const Relief& relief);
+
+/// Each place `times` as wide and high.
+Image<float> enlarged(const Image<float>& picture, int times);
+/// Two pictures of three channels beside one another, the lower one in the middle of black.
+Image<float> beside(const Image<float>& left, const Image<float>& right);
 
 }  // namespace opaline::daemon

@@ -242,14 +242,7 @@ Result<void> SphereReport::add_turned() {
         html::warning(fmt::format("No other view: {}", turned.error().message)) + "</section>\n";
     return ok();
   }
-  Image<float> both(2 * turned->even.width(), turned->even.height(), 3);
-  for (int y = 0; y < both.height(); ++y)
-    for (int x = 0; x < both.width(); ++x)
-      for (int c = 0; c < 3; ++c) {
-        const int half = turned->even.width();
-        both.at(x, y, c) =
-            x < half ? turned->even.at(x, y, c) : turned->from_left.at(x - half, y, c);
-      }
+  const Image<float> both = beside(turned->even, turned->from_left);
   if (auto written =
           write_png("dipole_turned", tone_mapped(both, white_point(turned->even, 0.998)));
       !written)
@@ -279,7 +272,7 @@ Result<void> SphereReport::add_dipole() {
   for (const DipoleView& view : *views) {
     const std::string name = "dipole_" + view.name;
     const int times = std::max(1, 320 / std::max(1, view.captured.width()));
-    const Image<float> both = side_by_side(view, times);
+    const Image<float> both = enlarged(beside(view.captured, view.rendered), times);
     if (auto written = write_png(name, tone_mapped(both, white_point(view.captured, 0.998)));
         !written)
       return written;

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <span>
 #include <thread>
 
 #include "base/files.h"
@@ -17,6 +18,8 @@
 #include "daemon/jobs/program.h"
 #include "daemon/jobs/stop_signals.h"
 #include "daemon/jobs/version.h"
+#include "daemon/scattering/maps_scene.h"
+#include "daemon/view/maps_viewing.h"
 #include "daemon/view/view_panels.h"
 #include "daemon/view/view_script.h"
 #include "daemon/view/view_window.h"
@@ -258,6 +261,23 @@ class Viewing {
   fs::path screenshot_;
 };
 
+/// A session's maps in place of a scene.
+Result<void> run_maps(const Arguments& a,
+                      std::span<const ViewAction> script,
+                      std::stop_token stop) {
+  return view_maps({.session = a.scene,
+                    .script = script,
+                    .frames = a.frames,
+                    .screenshot = a.screenshot,
+                    .window = {.title = fmt::format("Opaline: {}", a.scene.filename().string()),
+                               .width = a.width,
+                               .height = a.height,
+                               .device = a.device,
+                               .validation = a.validation,
+                               .on_validation_message = {}}},
+                   std::move(stop));
+}
+
 Result<void> run(const Arguments& arguments) {
   std::vector<ViewAction> script;
   for (const std::string& text : arguments.actions) {
@@ -265,11 +285,12 @@ Result<void> run(const Arguments& arguments) {
     if (!action) return action.error().in("--do");
     script.push_back(*std::move(action));
   }
-  auto scene = config::load_scene(arguments.scene);
-  if (!scene) return scene.error();
   std::stop_source stop;
   const auto signals = StopSignals::watch([&](int) { stop.request_stop(); });
   if (!signals) return signals.error();
+  if (is_session_directory(arguments.scene)) return run_maps(arguments, script, stop.get_token());
+  auto scene = config::load_scene(arguments.scene);
+  if (!scene) return scene.error();
   const auto processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   ThreadTeam team(arguments.threads > 0 ? arguments.threads : processors);
   return Viewing(arguments, std::move(script)).run(*scene, team, stop.get_token());
@@ -278,7 +299,10 @@ Result<void> run(const Arguments& arguments) {
 int program(int argc, char** argv) {
   CLI::App app("A window on a scene: light it, paint into it, bend it.");
   Arguments arguments;
-  app.add_option("SCENE", arguments.scene, "scene.toml (docs/rendering.md)")->required();
+  app.add_option("SCENE",
+                 arguments.scene,
+                 "scene.toml (docs/rendering.md), or a session in a sphere of lights: its maps")
+      ->required();
   app.add_option("--do", arguments.actions, "Does this, one thing a picture; may be given again");
   app.add_option("--frames", arguments.frames, "Ends after this many pictures")
       ->check(CLI::Range(0, 1'000'000));
@@ -301,7 +325,8 @@ int program(int argc, char** argv) {
       "  opaline-view config/scene_marble_torus.toml\n"
       "  opaline-view scene.toml --do 'brush radius 2' --do 'paint 0.5 0.6' --do 'screenshot "
       "a.png'\n"
-      "  opaline-view scene.toml --frames 5 --screenshot window.png");
+      "  opaline-view scene.toml --frames 5 --screenshot window.png\n"
+      "  opaline-view SESSION --do 'light 0 90 0' --do 'orbit 30 0' --screenshot turned.png");
   return run_command(app, "opaline-view", argc, argv, [&] { return run(arguments); });
 }
 

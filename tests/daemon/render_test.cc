@@ -149,6 +149,12 @@ TEST_F(RenderProgram, RefusesABadSceneOrOutputAndWritesNothing) {
       {scene("shape = \"sphere\"", "file = \"missing.obj\""), "--output", path("b.png").string()});
   EXPECT_EQ(file.wait(), 2);
   EXPECT_THAT(file.output(), AllOf(HasSubstr("object \"ball\""), HasSubstr("missing.obj")));
+  auto maps = start({scene(), "--output", path("b.png").string(), "--turn", "30"});
+  EXPECT_EQ(maps.wait(), 2);
+  EXPECT_THAT(maps.output(), HasSubstr("of a session's maps; this is a scene"));
+  auto session = start({directory_.path().string(), "--output", path("b.png").string()});
+  EXPECT_EQ(session.wait(), 2);
+  EXPECT_THAT(session.output(), HasSubstr("session"));
   EXPECT_FALSE(fs::exists(path("b.png")));
 }
 

@@ -10,69 +10,18 @@
 
 #include "base/io/volume_io.h"
 #include "daemon/scattering/start_material.h"
+#include "tests/support/ball_maps.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::daemon {
 namespace {
 
-using reconstruct::LeftOut;
-
-constexpr int kPixels = 96;
-constexpr double kPixelMm = 0.2;
-constexpr double kRadius = 8.0;
-constexpr double kSeen = 0.9;  // of the radius
-
-/// Maps of a ball of 8 mm: D 0.2 mm, l_d 1.5 mm everywhere; the left half without an answer where `holes`.
-SphereMaps ball_maps(bool holes) {
-  SphereMaps maps;
-  for (auto& m : maps.channels) {
-    m.width = m.height = kPixels;
-    const std::size_t count = std::size_t{kPixels} * kPixels;
-    for (auto* values : {&m.normal_x,
-                         &m.normal_y,
-                         &m.normal_z,
-                         &m.curvature,
-                         &m.reduced_albedo,
-                         &m.albedo_deviation,
-                         &m.diffusion,
-                         &m.log_diffusion_deviation,
-                         &m.translucency,
-                         &m.reduced_scattering,
-                         &m.absorption})
-      values->assign(count, 0.0F);
-    m.left_out.assign(count, LeftOut::kNotMeasured);
-    for (int y = 0; y < kPixels; ++y)
-      for (int x = 0; x < kPixels; ++x) {
-        const double nx = (x + 0.5 - 0.5 * kPixels) * kPixelMm / kRadius;
-        const double ny = (y + 0.5 - 0.5 * kPixels) * kPixelMm / kRadius;
-        if (std::hypot(nx, ny) > kSeen) continue;
-        const auto at = static_cast<std::size_t>(y * kPixels + x);
-        m.normal_x[at] = static_cast<float>(nx);
-        m.normal_y[at] = static_cast<float>(ny);
-        m.normal_z[at] = static_cast<float>(std::sqrt(1.0 - nx * nx - ny * ny));
-        if (holes && x < kPixels / 2) {
-          m.left_out[at] = LeftOut::kTooFlat;
-          continue;
-        }
-        m.left_out[at] = LeftOut::kFound;
-        m.reduced_albedo[at] = 0.95F;
-        m.diffusion[at] = 0.2F;
-        m.translucency[at] = 1.5F;
-        m.reduced_scattering[at] = 1.6F;
-        m.absorption[at] = 0.08F;
-      }
-  }
-  return maps;
-}
-
-SphereSession ball_session(const SphereMaps& maps) {
-  SphereSession session;
-  session.record.pixel_mm = kPixelMm;
-  session.measured = Image<std::uint8_t>(kPixels, kPixels, 1);
-  for (std::size_t at = 0; at < maps.channels[0].normal_z.size(); ++at)
-    session.measured.samples()[at] = maps.channels[0].normal_z[at] > 0.0F ? 1 : 0;
-  return session;
-}
+using support::ball_maps;
+using support::ball_session;
+using support::kPixelMm;
+using support::kPixels;
+using support::kRadius;
+using support::kSeen;
 
 // z = R (sqrt(1 - rho^2) - sqrt(1 - 0.9^2)) over the outline's plane; the trapezoids of the slopes err most at the steep outline, by a few hundredths of R.
 TEST(SphereShell, AddsUpTheNormalsOfABallToABall) {
@@ -125,7 +74,7 @@ TEST(SphereShell, HasAClosedMeshWithCoordinates) {
 
 TEST(SphereShell, NoAnswerAnywhereIsSaid) {
   SphereMaps maps = ball_maps(false);
-  for (auto& reason : maps.channels[1].left_out) reason = LeftOut::kBelowNoise;
+  for (auto& reason : maps.channels[1].left_out) reason = reconstruct::LeftOut::kBelowNoise;
   const SphereSession session = ball_session(maps);
   const auto shell = shell_of(maps, session, relief_of(maps, session), 1.4, "ball");
   ASSERT_FALSE(shell);
