@@ -15,6 +15,9 @@ find_package(Threads REQUIRED)
 find_program(OPALINE_CCACHE ccache)
 if(OPALINE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${OPALINE_CCACHE})
+  if(OPALINE_UNITY)  # what it asks for before it keeps what was compiled with precompiled headers
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${OPALINE_CCACHE})
+  endif()
 endif()
 
 add_library(opaline_options INTERFACE)
@@ -75,6 +78,19 @@ function(opaline_program name)
   target_link_libraries(${name} PRIVATE opaline_options ${A_USES} ${A_LINK} Threads::Threads)
 endfunction()
 
+# GoogleTest's headers are read once for all tests. Where a library's own macros forbid that, they are read again.
+function(opaline_compile_test_quickly name)
+  if(NOT TARGET opaline_test_headers)
+    file(WRITE ${CMAKE_BINARY_DIR}/test_headers.cc "")
+    add_library(opaline_test_headers OBJECT ${CMAKE_BINARY_DIR}/test_headers.cc)
+    target_link_libraries(opaline_test_headers PRIVATE opaline_options GTest::gmock GTest::gtest Threads::Threads)
+    target_compile_options(opaline_test_headers PRIVATE -O1 -Wno-error=invalid-pch -fpch-preprocess)
+    target_precompile_headers(opaline_test_headers PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+  endif()
+  target_compile_options(${name} PRIVATE -O1 -Wno-error=invalid-pch -fpch-preprocess)
+  target_precompile_headers(${name} REUSE_FROM opaline_test_headers)
+endfunction()
+
 # opaline_test(capture/bracket_test USES capture sim LABELS unit [LINK ...] [ENVIRONMENT A=b ...])
 # builds tests/capture/bracket_test.cc with GoogleTest's main, one ctest entry for the file. Labels: unit needs
 # nothing, threads is also run under TSan, conformance a driver, gpu a Vulkan device (a software one will do),
@@ -86,6 +102,9 @@ function(opaline_test path)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   list(TRANSFORM A_USES PREPEND opaline_)
   target_link_libraries(${name} PRIVATE opaline_options ${A_USES} ${A_LINK} GTest::gmock GTest::gtest_main)
+  if(OPALINE_UNITY)  # a third quicker to compile, and what takes time to run is in the libraries
+    opaline_compile_test_quickly(${name})
+  endif()
   foreach(label ${A_LABELS})  # `ninja tests_unit` builds what carries the label
     if(NOT TARGET tests_${label})
       add_custom_target(tests_${label})
