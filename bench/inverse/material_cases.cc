@@ -29,7 +29,7 @@ MaterialCase make_case(const Ground& ground, bool front) {
   made.scene.block.nz = front ? 24 : 12;
   made.transport.lit_face = front ? Face::kZMax : Face::kZMin;
   made.transport.camera_centre = sim::camera_above(made.scene.block, 300.0, front ? 20.0 : 10.0);
-  made.transport.photons_per_patch = front ? 1u << 18 : 1u << 19;
+  made.transport.photons_per_patch = front ? 1u << 21 : 1u << 19;
   return made;
 }
 
