@@ -1,5 +1,6 @@
 #include "render/trace/vertex_values.h"
 
+#include <algorithm>
 #include <array>
 
 namespace opaline::render {
@@ -10,8 +11,9 @@ Vec3 area_vector(const TriangleMesh& mesh, const std::array<int, 3>& t) {
   return cross(mesh.vertices[t[1]] - a, mesh.vertices[t[2]] - a) * 0.5;
 }
 
-std::vector<std::array<float, 3>> averaged(const TriangleMesh& mesh,
-                                           const std::vector<std::array<float, 3>>& values) {
+using Values = std::vector<std::array<float, 3>>;
+
+Values averaged(const TriangleMesh& mesh, const Values& values) {
   std::vector<std::array<double, 3>> sums(mesh.vertices.size());
   std::vector<double> areas(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -21,7 +23,7 @@ std::vector<std::array<float, 3>> averaged(const TriangleMesh& mesh,
       for (int c = 0; c < 3; ++c) sums[v][c] += area * values[t][c];
     }
   }
-  std::vector<std::array<float, 3>> means(sums.size());
+  Values means(sums.size());
   for (std::size_t v = 0; v < sums.size(); ++v) {
     if (areas[v] == 0.0) continue;
     for (int c = 0; c < 3; ++c) means[v][c] = static_cast<float>(sums[v][c] / areas[v]);
@@ -29,10 +31,39 @@ std::vector<std::array<float, 3>> averaged(const TriangleMesh& mesh,
   return means;
 }
 
+/// What the triangles have beyond the means of their corners.
+Values left_over(const TriangleMesh& mesh, const Values& values, const Values& corners) {
+  Values rest = values;
+  for (std::size_t t = 0; t < rest.size(); ++t) {
+    for (const int v : mesh.triangles[t]) {
+      for (int c = 0; c < 3; ++c) rest[t][c] -= corners[v][c] / 3.0F;
+    }
+  }
+  return rest;
+}
+
+/// A smooth function's average over the triangles around a corner is off by r^2 / 4 of its Laplacian, r from the corner to their
+/// middles, and the middle of a triangle is off the mean of its corners by as much again.
+constexpr float kHalf = 0.5F;
+
+Values averaged_twice(const TriangleMesh& mesh, const Values& values) {
+  Values corners = averaged(mesh, values);
+  const Values more = averaged(mesh, left_over(mesh, values, corners));
+  for (std::size_t v = 0; v < corners.size(); ++v) {
+    for (int c = 0; c < 3; ++c) corners[v][c] += kHalf * more[v][c];
+  }
+  return corners;
+}
+
 }  // namespace
 
 SurfaceLight at_vertices(const TriangleMesh& surface, const SurfaceLight& of_triangles) {
-  return {averaged(surface, of_triangles.fluence), averaged(surface, of_triangles.net_flux)};
+  SurfaceLight light{averaged_twice(surface, of_triangles.fluence),
+                     averaged_twice(surface, of_triangles.net_flux)};
+  for (auto& fluence : light.fluence) {
+    for (float& channel : fluence) channel = std::max(channel, 0.0F);
+  }
+  return light;
 }
 
 std::vector<Vec3> vertex_normals(const TriangleMesh& surface) {
