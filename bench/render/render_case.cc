@@ -7,6 +7,7 @@
 
 #include "base/log.h"
 #include "render/mesh/shapes.h"
+#include "render/solver/large_pages.h"
 #include "render/tetrahedra/stuffing.h"
 
 namespace opaline::bench {
@@ -78,7 +79,7 @@ LitObject::LitObject(const render::TetMesh& mesh, ThreadTeam& team, int remember
       optics_(marbled(graph_)),
       diffusion_(graph_, render_boundary()),
       q_(graph_.surface.size()),
-      phi_(graph_.inner.size(), Lanes<float>::zero()) {
+      phi_(render::large_vector(graph_.inner.size(), Lanes<float>::zero())) {
   if (auto taken = diffusion_.set_material(optics_); !taken) give_up(taken.error());
   solver_ = std::make_unique<render::LaneSolver<float>>(
       diffusion_.matrix(), render::HierarchyOptions{}, team, remembered);

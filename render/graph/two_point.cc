@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/ensure.h"
+#include "render/solver/large_pages.h"
 
 namespace opaline::render {
 namespace {
@@ -39,14 +40,15 @@ double reach_back(const Graph& graph, int from, int to) {
 template <class T, class Graph>
 TwoPoint<T, Graph>::TwoPoint(const Graph& graph, const reconstruct::diffusion::Boundary& boundary)
     : graph_(graph), boundary_(boundary) {
+  reserve_large(matrix_.columns, 4 * graph.inner.size());
   for (const auto& links : graph.links) {
     for (const auto& link : links) {
       if (link.inner >= 0) matrix_.columns.push_back(link.inner);
     }
     matrix_.starts.push_back(static_cast<int>(matrix_.columns.size()));
   }
-  matrix_.entries.resize(matrix_.columns.size(), Lanes<T>::zero());
-  matrix_.sinks.resize(graph.inner.size(), Lanes<T>::zero());
+  matrix_.entries = large_vector(matrix_.columns.size(), Lanes<T>::zero());
+  matrix_.sinks = large_vector(graph.inner.size(), Lanes<T>::zero());
   conductances_.resize(graph.surface.size(), Lanes<T>::zero());
 }
 
@@ -81,6 +83,7 @@ template <class T, class Graph>
 void TwoPoint<T, Graph>::load(std::span<const std::array<float, 3>> q,
                               std::vector<Lanes<T>>& b) const {
   ENSURE(q.size() == graph_.surface.size());
+  reserve_large(b, graph_.inner.size());
   b.assign(graph_.inner.size(), Lanes<T>::zero());
   for (std::size_t s = 0; s < q.size(); ++s) {
     Lanes<T> source = Lanes<T>::zero();

@@ -4,6 +4,7 @@
 
 #include "render/graph/finite_elements.h"
 #include "render/scene/fresh_hierarchy.h"
+#include "render/solver/large_pages.h"
 #include "render/trace/vertex_values.h"
 
 namespace opaline::render {
@@ -17,7 +18,8 @@ constexpr HierarchyOptions kElementHierarchy{.first_rings = 1};
 class ElementsSubsurface final : public Subsurface {
  public:
   ElementsSubsurface(TetMesh mesh, const DiffusionOptions& options)
-      : Subsurface(std::move(mesh), options), phi_(mesh_.vertices.size(), Lanes<double>::zero()) {}
+      : Subsurface(std::move(mesh), options),
+        phi_(large_vector(mesh_.vertices.size(), Lanes<double>::zero())) {}
 
   Result<void> begin_with(const SignedDistance& solid,
                           const MaterialAt& material,

@@ -7,6 +7,7 @@
 #include "render/graph/nearest.h"
 #include "render/graph/two_point.h"
 #include "render/scene/fresh_hierarchy.h"
+#include "render/solver/large_pages.h"
 #include "render/trace/vertex_values.h"
 
 namespace opaline::render {
@@ -29,7 +30,7 @@ class GraphSubsurface final : public Subsurface {
         graph_(std::move(graph)),
         boundary_(boundary),
         diffusion_(graph_, boundary),
-        phi_(graph_.inner.size(), Lanes<T>::zero()) {}
+        phi_(large_vector(graph_.inner.size(), Lanes<T>::zero())) {}
 
   Result<void> begin_with(const SignedDistance& solid,
                           const MaterialAt& material,

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/solver/large_pages.h"
+
 namespace opaline::render {
 namespace {
+
+constexpr std::size_t kLikelyGroups = 3;  // that a node follows; to reserve memory by
 
 template <class T>
 std::vector<Lanes<T>> diagonals(const LaneMatrix<T>& a) {
@@ -157,6 +161,8 @@ Interpolation<T> smooth_interpolation(const LaneMatrix<T>& a,
   const std::vector<char> strong = strong_entries(a, strength);
   Interpolation<T> p;
   p.coarse_rows = groups.count;
+  reserve_large(p.columns, kLikelyGroups * static_cast<std::size_t>(a.rows()));
+  reserve_large(p.weights, kLikelyGroups * static_cast<std::size_t>(a.rows()));
   RowSum<T> sum(groups.count);
   for (int i = 0; i < a.rows(); ++i) {
     T diagonal = mean_of(a.sinks[i]);
@@ -183,8 +189,8 @@ Interpolation<T> transpose(const Interpolation<T>& p) {
   for (const int c : p.columns) ++counts[c + 1];
   for (int c = 0; c < p.coarse_rows; ++c) counts[c + 1] += counts[c];
   r.starts = counts;
-  r.columns.resize(p.columns.size());
-  r.weights.resize(p.columns.size());
+  r.columns = large_vector(p.columns.size(), 0);
+  r.weights = large_vector(p.columns.size(), T{0});
   for (int i = 0; i < p.rows(); ++i) {
     for (int e = p.starts[i]; e < p.starts[i + 1]; ++e) {
       const int at = counts[p.columns[e]]++;
@@ -200,6 +206,8 @@ LaneMatrix<T> coarsen(const LaneMatrix<T>& a,
                       const Interpolation<T>& p,
                       const Interpolation<T>& restriction) {
   LaneMatrix<T> coarse;
+  reserve_large(coarse.columns, a.columns.size() / kLikelyGroups);
+  reserve_large(coarse.entries, a.columns.size() / kLikelyGroups);
   RowSum<Lanes<T>> fine_row(a.rows());
   RowSum<Lanes<T>> row(p.coarse_rows);
   for (int c = 0; c < p.coarse_rows; ++c) {

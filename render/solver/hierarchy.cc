@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "render/solver/large_pages.h"
+
 namespace opaline::render {
 namespace {
 
@@ -22,7 +24,7 @@ void over_rows(int rows, ThreadTeam& team, const Work& work) {
 
 template <class T>
 std::vector<Lanes<T>> inverse_diagonal(const LaneMatrix<T>& a) {
-  std::vector<Lanes<T>> inverse(a.rows());
+  auto inverse = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
   for (int i = 0; i < a.rows(); ++i) inverse[i] = divide(Lanes<T>::all(1), a.diagonal(i));
   return inverse;
 }
@@ -93,9 +95,8 @@ struct Hierarchy<T>::Level {
 
   Level(const LaneMatrix<T>& a, int steps)
       : inverse(inverse_diagonal(a)), factors(chebyshev(steps, largest_eigenvalue(a, inverse))) {
-    const std::vector<Lanes<T>> zeros(a.rows(), Lanes<T>::zero());
-    b = x = next = zeros;
-    if (steps > 1) d = zeros;
+    for (auto* field : {&b, &x, &next}) *field = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
+    if (steps > 1) d = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
     finest_entries = a.columns.size() + a.sinks.size();
   }
 

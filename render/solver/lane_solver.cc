@@ -8,6 +8,7 @@
 
 #include "base/ensure.h"
 #include "base/flush_denormals.h"
+#include "render/solver/large_pages.h"
 
 namespace opaline::render {
 namespace {
@@ -124,7 +125,10 @@ SolveSummary LaneSolver<T>::solve(const std::vector<Lanes<T>>& b,
                                   std::stop_token stop) {
   ENSURE(static_cast<int>(b.size()) == matrix_.rows() && x.size() == b.size());
   const FlushDenormals flush;
-  for (auto* field : {&r_, &z_, &q_}) field->resize(b.size(), Lanes<T>::zero());
+  for (auto* field : {&r_, &z_, &p_, &q_}) {
+    reserve_large(*field, b.size());
+    field->resize(b.size(), Lanes<T>::zero());
+  }
   const Lanes<T> b2 = dot(b, b);
   history_.guess(b, x, team_);
   clear_dark_channels(b2, x);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "render/solver/lane_matrix.h"
+#include "render/solver/large_pages.h"
 
 namespace opaline::render {
 
@@ -57,7 +58,7 @@ using RoughEntries = std::vector<RoughEntry<T>>;
 template <class T>
 RoughEntries<T> rough_entries(const LaneMatrix<T>& a) {
   RoughEntries<T> rough;
-  rough.reserve(a.entries.size());
+  reserve_large(rough, a.entries.size());
   for (const Lanes<T>& entry : a.entries) rough.push_back(RoughEntry<T>::of(entry));
   return rough;
 }
