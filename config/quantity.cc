@@ -69,7 +69,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 std::string format_share(double value) {
   for (int digits = 1; digits < 17; ++digits) {
     std::string text = fmt::format("{:.{}g}", 100.0 * value, digits);
-    if (std::strtod(text.c_str(), nullptr) / 100.0 == value) return text + " %";
+    const bool plain = value < 0.01 || text.find('e') == std::string::npos;  // "50", not "5e+01"
+    if (plain && std::strtod(text.c_str(), nullptr) / 100.0 == value) return text + " %";
   }
   return fmt::format("{} %", 100.0 * value);
 }

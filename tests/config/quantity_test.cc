@@ -19,7 +19,7 @@ TEST(Quantity, TakesANumberAndAUnitOfItsKind) {
 TEST(Quantity, PrintsSharesInPerCent) {
   EXPECT_EQ(parse_quantity("2 %", Unit::kShare), 0.02);
   EXPECT_DOUBLE_EQ(parse_quantity("0.35%", Unit::kShare).value(), 0.0035);
-  for (const char* text : {"2 %", "0.35 %", "0 %", "7 %", "14.3 %"})
+  for (const char* text : {"2 %", "0.35 %", "0 %", "7 %", "14.3 %", "50 %", "100 %"})
     EXPECT_EQ(format_quantity(parse_quantity(text, Unit::kShare).value(), Unit::kShare), text);
 }
 
