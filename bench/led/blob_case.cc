@@ -25,15 +25,7 @@ void print_blob(const std::string& which, const StageErrors& e) {
                fmt::format("{}, answered", which).c_str(),
                e.answered_normal_deg,
                "degrees");
-  for (std::size_t reason = 1; reason < e.reasons.size(); ++reason)
-    if (e.reasons[reason] > 0.0)
-      print_figure(
-          "led.share_left_out",
-          fmt::format(
-              "{}, {}", which, reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason)))
-              .c_str(),
-          e.reasons[reason],
-          "1");
+  print_reasons(which, e);
 }
 
 }  // namespace

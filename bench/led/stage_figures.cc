@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "bench/figure.h"
@@ -12,11 +13,12 @@ namespace opaline::bench {
 namespace {
 
 /// Shares of the pixels that have an answer, and that have a wrong one: beyond two stated deviations.
-void print_extreme(const char* which, const StageErrors& e) {
+void print_extreme(const std::string& which, const StageErrors& e) {
   print_figure("led.extreme_found", which, e.found, "1");
   print_figure("led.extreme_wrong", which, e.wrong, "1");
   print_figure(
       "led.extreme_bias_over_stated", which, e.stated > 0.0 ? e.bias / e.stated : 0.0, "1");
+  print_reasons(which, e);
 }
 
 }  // namespace
@@ -87,10 +89,9 @@ void measure_extremes(ThreadTeam& team, std::int64_t paths) {
                                    {"dead lamp behind", Vec3{0, 0, -1}}}) {
     dead.dead_lamps = {lamp_towards(dead.lamps, way)};
     dead.dead_are_known = false;
-    print_extreme(fmt::format("{}, unknown", which).c_str(), StageCase(dead).run({}, team));
+    print_extreme(fmt::format("{}, unknown", which), StageCase(dead).run({}, team));
     dead.dead_are_known = true;
-    print_extreme(fmt::format("{}, found by the lamp check", which).c_str(),
-                  StageCase(dead).run({}, team));
+    print_extreme(fmt::format("{}, found by the lamp check", which), StageCase(dead).run({}, team));
   }
   StageScene uneven = ordinary;
   uneven.intensity_error = 0.03;
