@@ -38,6 +38,9 @@ struct StagePictures {
 /// direction makes leave: Fresnel's transmittance times the clamped cosine, its Legendre coefficients damped by 1/(1 + l (l + 1) c), c so that
 /// its ratio is the r measured. Only the small difference depends on that shape. Twice over: normals and r get better.
 ///
+/// Where normals turn slowly from pixel to pixel, the difference is found for blocks of up to 16 x 16 of them, within which they turn by a hundredth, and taken as
+/// linear in the normal there: what that leaves out is its second order, 1e-4 of a picture at most.
+///
 /// A pixel's depth, which decides its distance to lamps, is taken from its normal and mean curvature, n_z / H over the object's plane (exact on
 /// balls; 0 to half the object's width).
 ///

@@ -186,5 +186,73 @@ TEST(StageCorrection, RefusesWhatDoesNotFit) {
             "no lamp shines in the constant picture");
 }
 
+/// A ball of 400 pixels of radius, or every `step`-th of them, under 156 lamps that make light leave by a law of some shape.
+struct LargeBall {
+  StageRecord record;
+  StagePictures pictures;
+
+  explicit LargeBall(int step) {
+    constexpr int kWhole = 480;
+    constexpr double kRadiusPx = 400.0;
+    constexpr double kPixelMm = 0.025;
+    record.lights = light_sphere(156, 600.0, 1.0);
+    record.pixel_mm = kPixelMm * step;
+    record.middle_x = record.middle_y = 0.5 * kWhole / step + 0.5 - 0.5 / step;
+    record.distance_mm = 1000.0;
+    const auto patterns = *capture::stage_patterns(record.lights, record.axes, {.specular = false});
+    pictures.width = pictures.height = kWhole / step;
+    for (int k = 0; k < 4; ++k) {
+      StagePictures::Picture picture{{}, {}, patterns[static_cast<std::size_t>(k)].codes};
+      for (int y = 0; y < kWhole; y += step)
+        for (int x = 0; x < kWhole; x += step) {
+          const Vec3 across{
+              (x + 0.5 - 0.5 * kWhole) / kRadiusPx, (0.5 * kWhole - y - 0.5) / kRadiusPx, 0.0};
+          const Vec3 normal{across.x, across.y, std::sqrt(1.0 - dot(across, across))};
+          const double light = radiance(normal, normal * (kRadiusPx * kPixelMm), picture.codes);
+          picture.radiance.push_back(static_cast<float>(light));
+          picture.variance.push_back(1e-20F);
+        }
+      (k == 0 ? pictures.constant : pictures.gradients[static_cast<std::size_t>(k - 1)]) =
+          std::move(picture);
+    }
+    pictures.measured.assign(pictures.constant.radiance.size(), kMeasured);
+  }
+  double radiance(Vec3 normal, Vec3 at, const std::vector<std::uint8_t>& codes) const {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < record.lights.size(); ++n) {
+      const Vec3 to = record.lights[n].position - at;
+      const double cosine = dot(normal, normalized(to));
+      sum += codes[n] / dot(to, to) * (0.2 * (1.0 + cosine) + std::max(0.0, cosine));
+    }
+    return sum;
+  }
+};
+
+// What blocks leave out is of second order in how normals turn within one, 0.005 radians from its middle, in a difference of 2 % that changes over 0.15: half of
+// 0.02 (0.005 / 0.15)^2, some 1e-5; their depths differ too, by windows of other sizes.
+TEST(StageCorrection, BlocksOfPixelsAreCorrectedAsEachPixelIs) {
+  constexpr int kStep = 8;
+  const LargeBall fine(1);        // blocks of 4
+  const LargeBall coarse(kStep);  // normals turn by 0.02 a pixel: each by itself
+  ThreadTeam team(2);
+  const auto blocks = *ideal_pictures(fine.pictures, fine.record, 1.4, team);
+  const auto pixels = *ideal_pictures(coarse.pictures, coarse.record, 1.4, team);
+  double worst = 0.0;
+  double changed = 0.0;
+  for (int y = 8; y < coarse.pictures.height - 8; ++y)
+    for (int x = 8; x < coarse.pictures.width - 8; ++x) {
+      const auto at = static_cast<std::size_t>(y * coarse.pictures.width + x);
+      const auto same = static_cast<std::size_t>(y * kStep * fine.pictures.width + x * kStep);
+      const double unit = pixels.radiance[0][at];
+      for (std::size_t k = 0; k < 4; ++k)
+        worst = std::max(worst, std::abs(blocks.radiance[k][same] - pixels.radiance[k][at]) / unit);
+      const double was =
+          coarse.pictures.gradients[0].radiance[at] / coarse.pictures.constant.radiance[at];
+      changed = std::max(changed, std::abs(pixels.radiance[1][at] / unit - was));
+    }
+  EXPECT_LT(worst, 1e-4);
+  EXPECT_GT(changed, 20.0 * 1e-4);  // there was something to correct
+}
+
 }  // namespace
 }  // namespace opaline::reconstruct
