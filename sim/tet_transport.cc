@@ -84,6 +84,7 @@ struct Photon {
 
 struct Sums {
   std::vector<double> left;
+  std::vector<double> first;  // empty where it is not counted
   double absorbed = 0.0;
   double unscattered = 0.0;
 };
@@ -170,6 +171,7 @@ class Tracer {
       if (out == nullptr || depth < scattering * distance) {
         const double flown = out == nullptr ? 0.0 : depth / scattering;
         advance(photon, flown, sums);
+        if (!photon.collided && !sums.first.empty()) sums.first[photon.tet] += photon.weight;
         photon.collided = true;
         photon.along = around({0.0, 0.0, 1.0},
                               2.0 * random.uniform() - 1.0,
@@ -262,7 +264,10 @@ TetTransportResult summed(const std::vector<Sums>& batches, std::uint64_t photon
     const double variance = std::max(0.0, squares / count - result.left[p] * result.left[p]);
     result.standard_error[p] = std::sqrt(variance / (count - 1.0));
   }
+  result.first.resize(batches[0].first.size());
   for (const Sums& batch : batches) {
+    for (std::size_t t = 0; t < result.first.size(); ++t)
+      result.first[t] += batch.first[t] * scale / count;
     result.absorbed += batch.absorbed * scale / count;
     result.unscattered += batch.unscattered * scale / count;
   }
@@ -292,6 +297,7 @@ Result<TetTransportResult> trace_tets(const TetSolid& solid,
       threads.emplace_back([&] {
         for (int b = next++; b < kBatches; b = next++) {
           batches[b].left.resize(patches);
+          if (options.count_first) batches[b].first.resize(solid.tets.size());
           SplitMix seeds(options.seed * kBatches + static_cast<std::uint64_t>(b));
           SplitMix random(seeds.next());
           for (std::uint64_t k = 0; k < photons && !stop.stop_requested(); ++k) {

@@ -37,6 +37,7 @@ struct TetTransportOptions {
   TetEntry entry = TetEntry::kDiffuse;
   Vec3 direction{0.0, 0.0, -1.0};  ///< outside, in which collimated light travels
   bool count_unscattered = true;   ///< whether light that leaves without a collision is tallied
+  bool count_first = false;        ///< whether first collisions are tallied
   std::uint64_t photons = 1'000'000;
   std::uint64_t seed = 1;
   int threads = 1;
@@ -46,6 +47,7 @@ struct TetTransportOptions {
 struct TetTransportResult {
   std::vector<double> left;            ///< of each patch
   std::vector<double> standard_error;  ///< of `left`, from batches
+  std::vector<double> first;  ///< scattered for the first time in each tetrahedron, where counted
   double absorbed = 0.0;
   double unscattered = 0.0;  ///< left without a collision, tallied or not
 };
