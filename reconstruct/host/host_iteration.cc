@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kTrusted =
     1e-3;  // share of z . K z below which the recurrence of p . K p is noise
+constexpr int kBytesAtWork = 512 << 10;  // of p, in four planes: a quarter of the cache
+constexpr int kFewestRows = 4;
 
 }  // namespace
 
@@ -91,28 +93,44 @@ void HostPasses<T, S>::update_slab(Slab slab, Direction mode) {
     if (slab.has(k)) return work_.p.plane(k);
     return work_.halo[slab.thread].plane(k < slab.begin ? 0 : 1);
   };
-  for (int k = slab.begin; k < slab.end + 1; ++k) {
-    const Planes u{plane(k - 2), plane(k - 1), plane(k), work_.p.row_size(), level.ni, 0, 0};
-    if (k > slab.begin) clear_sums(k - 1, 0);
-    for (int j = 0; j < level.ni; ++j) {
-      if (k < slab.end)
-        kernels_.direction(mode,
-                           work_.p.row(j, k),
-                           work_.z[0].row(j, k),
-                           work_.d.row(j, k),
-                           step_length_.data(),
-                           beta_.data(),
-                           level.nx);
-      if (k > slab.begin)
-        kernels_.update(work_.r[0].row(j, k - 1),
-                        level.sink + level.row(j, k - 1),
-                        stencil(level, u, j, k - 1, 0),
-                        alpha_.data(),
-                        factor_.data(),
-                        &work_.norm_sums[sums_at(k - 1, 0)],
-                        level.nx);
+  const auto row_bytes = static_cast<int>(work_.p.row_size() * sizeof(T));
+  const int step = std::max(kFewestRows, kBytesAtWork / (4 * row_bytes));
+  for (int j = 0; j < level.ni; j += step) {
+    const bool last = j + step >= level.ni;
+    const Rows moved{j, last ? level.ni : j + step};
+    const Rows updated{std::max(0, moved.begin - 1), last ? level.ni : moved.end - 1};
+    for (int k = slab.begin; k < slab.end + 1; ++k) {
+      if (k < slab.end) move_rows(moved, k, mode);
+      const Planes u{plane(k - 2), plane(k - 1), plane(k), work_.p.row_size(), level.ni, 0, 0};
+      if (k > slab.begin) update_rows(updated, k - 1, u);
     }
   }
+}
+
+template <class T, class S>
+void HostPasses<T, S>::move_rows(Rows rows, int k, Direction mode) {
+  for (int j = rows.begin; j < rows.end; ++j)
+    kernels_.direction(mode,
+                       work_.p.row(j, k),
+                       work_.z[0].row(j, k),
+                       work_.d.row(j, k),
+                       step_length_.data(),
+                       beta_.data(),
+                       grid_.levels[0].nx);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::update_rows(Rows rows, int k, const Planes& u) {
+  const HostLevel<T>& level = grid_.levels[0];
+  if (rows.begin == 0) clear_sums(k, 0);
+  for (int j = rows.begin; j < rows.end; ++j)
+    kernels_.update(work_.r[0].row(j, k),
+                    level.sink + level.row(j, k),
+                    stencil(level, u, j, k, 0),
+                    alpha_.data(),
+                    factor_.data(),
+                    &work_.norm_sums[sums_at(k, 0)],
+                    level.nx);
 }
 
 template class HostPasses<float, float>;

@@ -65,7 +65,7 @@ class HostPasses {
     int end;
     bool has(int plane) const { return begin <= plane && plane < end; }
   };
-  /// Of a plane of the caller's fields.
+  /// Of a plane.
   struct Rows {
     int begin;
     int end;
@@ -123,6 +123,8 @@ class HostPasses {
   void energy_row(const Wave& w, int j, int k);
   void combine_halo(Slab slab);
   void update_slab(Slab slab, Direction mode);
+  void move_rows(Rows rows, int k, Direction mode);
+  void update_rows(Rows rows, int k, const Planes& u);
   void rescale();
   std::span<const double> residual_pass(bool keeps);
   void residual_slab(Slab slab, bool moves);
