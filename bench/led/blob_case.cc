@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bench/figure.h"
-#include "bench/led/stage_case.h"
+#include "bench/led/stage_figures.h"
 
 namespace opaline::bench {
 namespace {

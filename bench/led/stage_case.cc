@@ -1,14 +1,11 @@
 #include "bench/led/stage_case.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 
 #include "base/ensure.h"
-#include "bench/figure.h"
 #include "bench/stopwatch.h"
 #include "capture/stage_patterns.h"
 #include "drivers/stage_picture.h"
@@ -34,14 +31,6 @@ double quantile(std::vector<double> values, double share) {
 }
 
 }  // namespace
-
-void print_reasons(const std::string& which, const StageErrors& e) {
-  for (std::size_t reason = 1; reason < e.reasons.size(); ++reason) {
-    if (!(e.reasons[reason] > 0.0)) continue;
-    const auto why = reconstruct::to_string(static_cast<LeftOut>(reason));
-    print_figure("led.share_left_out", fmt::format("{}, {}", which, why), e.reasons[reason], "1");
-  }
-}
 
 int lamp_towards(int lamps, Vec3 direction) {
   const auto all = light_sphere_directions(lamps);

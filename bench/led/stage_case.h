@@ -65,9 +65,6 @@ struct StageErrors {
   std::array<double, reconstruct::kLastReason + 1> reasons{};  ///< share of the pixels by LeftOut
 };
 
-/// Prints led.share_left_out for every reason there was.
-void print_reasons(const std::string& which, const StageErrors& errors);
-
 /// The lamp nearest to a direction.
 int lamp_towards(int lamps, Vec3 direction);
 

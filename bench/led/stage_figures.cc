@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "bench/figure.h"
-#include "bench/led/stage_case.h"
 
 namespace opaline::bench {
 namespace {
@@ -22,6 +21,14 @@ void print_extreme(const std::string& which, const StageErrors& e) {
 }
 
 }  // namespace
+
+void print_reasons(const std::string& which, const StageErrors& e) {
+  for (std::size_t reason = 1; reason < e.reasons.size(); ++reason) {
+    if (!(e.reasons[reason] > 0.0)) continue;
+    const auto why = reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason));
+    print_figure("led.share_left_out", fmt::format("{}, {}", which, why), e.reasons[reason], "1");
+  }
+}
 
 void measure_stage(ThreadTeam& team, std::int64_t paths) {
   StageScene scene;
