@@ -52,7 +52,9 @@ std::array<Image<float>, 4> captured_terms(const SphereSession& session, const R
     for (int y = 0; y < r.height; ++y)
       for (int x = 0; x < r.width; ++x) {
         if (!r.has(x, y)) continue;
-        const auto at = static_cast<std::size_t>(y * r.step) * pictures.width + x * r.step;
+        const auto at =
+            static_cast<std::size_t>(y * r.step) * static_cast<std::size_t>(pictures.width) +
+            static_cast<std::size_t>(x * r.step);
         const auto here = terms_at(pictures, at);
         for (std::size_t k = 0; k < 4; ++k)
           terms[k].at(x, y, c) = static_cast<float>(here[k] / white);

@@ -242,7 +242,8 @@ Result<void> SphereReport::add_turned() {
         html::warning(fmt::format("No other view: {}", turned.error().message)) + "</section>\n";
     return ok();
   }
-  const Image<float> both = beside(turned->even, turned->from_left);
+  const Image<float> small = beside(turned->even, turned->from_left);
+  const Image<float> both = enlarged(small, std::max(1, 640 / std::max(1, small.width())));
   if (auto written =
           write_png("dipole_turned", tone_mapped(both, white_point(turned->even, 0.998)));
       !written)

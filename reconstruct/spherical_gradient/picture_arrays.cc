@@ -2,19 +2,19 @@
 
 #include <sys/mman.h>
 
-#include <cstdint>
+#include <memory>
 
 namespace opaline::reconstruct {
 namespace {
 
-constexpr std::uintptr_t kLargePage = 2U << 20U;
+constexpr std::size_t kLargePage = std::size_t{2} << 20U;
 
 /// What lies wholly within; a wish, so whether it is granted does not matter.
-void wish_for_large_pages(const float* begin, std::size_t count) {
-  const auto first = reinterpret_cast<std::uintptr_t>(begin);
-  const std::uintptr_t from = (first + kLargePage - 1) / kLargePage * kLargePage;
-  const std::uintptr_t to = (first + count * sizeof(float)) / kLargePage * kLargePage;
-  if (from < to) madvise(reinterpret_cast<void*>(from), to - from, MADV_HUGEPAGE);
+void wish_for_large_pages(float* values, std::size_t count) {
+  void* begin = values;
+  std::size_t bytes = count * sizeof(float);
+  if (std::align(kLargePage, kLargePage, begin, bytes) == nullptr) return;
+  madvise(begin, bytes / kLargePage * kLargePage, MADV_HUGEPAGE);
 }
 
 }  // namespace
