@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
+#include <thread>
 
+#include "base/log.h"
 #include "gpu/commands.h"
+#include "render/block_rays.h"
 #include "render/raster/picture_tile.h"
 #include "render/scene_buffer.h"
 #include "render_shaders.h"
@@ -51,13 +55,17 @@ Result<void> Renderer::State::draw_tile(
   return context->run(commands);
 }
 
-Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Renderer::Renderer(const RendererOptions& options, std::unique_ptr<State> state)
+    : options_(options), state_(std::move(state)) {}
 Renderer::~Renderer() = default;
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
   if (options.samples_per_axis < 1 || options.samples_per_axis > 8)
     return invalid_argument(
         fmt::format("samples_per_axis = {}; expected 1 to 8", options.samples_per_axis));
+  if (options.host_threads > 0) {
+    return std::unique_ptr<Renderer>(new Renderer(options, nullptr));
+  }
   gpu::ContextOptions wanted = options.gpu;
   wanted.device.graphics = true;
   auto context = gpu::Context::create(wanted);
@@ -70,7 +78,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   auto commands = gpu::Commands::create(**context);
   if (!commands) return commands.error();
   return std::unique_ptr<Renderer>(
-      new Renderer(std::unique_ptr<State>(new State{options,
+      new Renderer(options,
+                   std::unique_ptr<State>(new State{options,
                                                     *std::move(context),
                                                     *std::move(draw),
                                                     *std::move(resolve),
@@ -78,9 +87,23 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
                                                     {}})));
 }
 
+Result<std::unique_ptr<Renderer>> Renderer::create_or_host(RendererOptions options,
+                                                           int host_threads) {
+  auto made = create(options);
+  if (made || made.error().code != ErrorCode::kUnavailable) return made;
+  log::warning("{}: drawing without a device", made.error().message);
+  const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+  options.host_threads = std::max(1, host_threads > 0 ? host_threads : cores);
+  return create(options);
+}
+
 Result<Image<float>> Renderer::draw(const SurfaceField& field,
                                     const CameraModel& camera,
                                     std::stop_token stop) {
+  if (!state_) {
+    return draw_by_rays(
+        field, camera, options_.samples_per_axis, options_.host_threads, std::move(stop));
+  }
   if (auto good = validate(field); !good) return good.error();
   const auto scene = describe_scene(field, camera, state_->options.samples_per_axis);
   if (!scene) return scene.error();
@@ -107,7 +130,8 @@ Result<Image<float>> Renderer::draw(const SurfaceField& field,
 }
 
 std::string Renderer::description() const {
-  const int s = state_->options.samples_per_axis;
+  const int s = options_.samples_per_axis;
+  if (!state_) return fmt::format("host rays, {} samples a pixel", s * s);
   return fmt::format("{}, {} samples a pixel", state_->context->device().name, s * s);
 }
 

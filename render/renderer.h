@@ -16,9 +16,11 @@ struct RendererOptions {
   gpu::ContextOptions gpu;  ///< which device draws; `graphics` is set by the renderer
   int samples_per_axis =
       2;  ///< of each pixel, on a regular grid: 2 takes 4 samples a pixel; 1 to 8
+  int host_threads =
+      0;  ///< 0: through Vulkan; else without a device, on so many threads (render/block_rays.h)
 };
 
-/// Draws lit translucent blocks headless, through Vulkan, in linear radiance.
+/// Draws lit translucent blocks headless, through Vulkan or without a device, in linear radiance.
 ///
 /// Every sample is exact: triangles only say where to look, the fragment shader undoes the lens
 /// (Brown's distortion, Newton's method), meets the ray with the face's plane and evaluates the
@@ -33,6 +35,9 @@ struct RendererOptions {
 class Renderer {
  public:
   static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
+  /// Through Vulkan where there is a device that will do, else on `host_threads` threads (0: one a core); description() says which.
+  static Result<std::unique_ptr<Renderer>> create_or_host(RendererOptions options,
+                                                          int host_threads);
   ~Renderer();
 
   /// A picture of camera.width x camera.height pixels, 4 channels: red, green, blue, and the part
@@ -47,8 +52,9 @@ class Renderer {
 
  private:
   struct State;
-  explicit Renderer(std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  Renderer(const RendererOptions& options, std::unique_ptr<State> state);
+  RendererOptions options_;
+  std::unique_ptr<State> state_;  // none: on the host
 };
 
 }  // namespace opaline::render

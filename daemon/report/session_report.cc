@@ -124,8 +124,9 @@ class SessionReport {
 Result<void> SessionReport::run(const gpu::ContextOptions& gpu) {
   solver_ = reconstruct::host::make_host_solver({.threads = data_.config.reconstruction.threads});
   data_.solver = solver_->description();
-  auto renderer = render::Renderer::create(
-      {.gpu = gpu, .samples_per_axis = data_.config.preview.samples_per_axis});
+  auto renderer = render::Renderer::create_or_host(
+      {.gpu = gpu, .samples_per_axis = data_.config.preview.samples_per_axis},
+      data_.config.reconstruction.threads);
   if (!renderer) return renderer.error();
   data_.renderer = (*renderer)->description();
   if (auto done = light_the_material(); !done) return done;

@@ -14,7 +14,7 @@ namespace opaline::daemon {
 /// of a simulated station its stored light transport.
 /// Progress: "lighting", "relighting", "BSSRDF error", "report". Fact: preview.completed
 /// {relighting_error?, noise_floor?, bssrdf_error?}: without held-out lights that can be used there
-/// are no relit pictures. A plot that cannot be drawn leaves a note in the report.
+/// are no relit pictures. Pictures are drawn through Vulkan, or by rays on the host where there is no device; the report says which. A plot that cannot be drawn leaves a note in the report.
 /// Errors: those of the files, the solver and the renderer; kCancelled.
 Result<void> report_session(JobContext& job, const gpu::ContextOptions& gpu = {});
 

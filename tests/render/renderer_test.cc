@@ -55,6 +55,9 @@ class RendererTest : public testing::Test {
     auto renderer = Renderer::create({tests::validated(), 2});
     ASSERT_TRUE(renderer) << renderer.error().message;
     renderer_ = *std::move(renderer);
+    auto host = Renderer::create({.gpu = {}, .samples_per_axis = 2, .host_threads = 2});
+    ASSERT_TRUE(host) << host.error().message;
+    host_ = *std::move(host);
   }
   Image<float> draw(const SurfaceField& field, const CameraModel& camera) {
     auto picture = renderer_->draw(field, camera, {});
@@ -65,7 +68,14 @@ class RendererTest : public testing::Test {
   /// Where a ray passes an edge within rounding it may fall on either side: that is allowed for two
   /// pixels.
   void expect_as_ray_cast(const SurfaceField& field, const CameraModel& camera) {
-    const Image<float> drawn = draw(field, camera);
+    expect_as_ray_cast(field, camera, draw(field, camera));
+    const auto on_host = host_->draw(field, camera, {});
+    ASSERT_TRUE(on_host) << on_host.error().message;
+    expect_as_ray_cast(field, camera, *on_host);
+  }
+  static void expect_as_ray_cast(const SurfaceField& field,
+                                 const CameraModel& camera,
+                                 const Image<float>& drawn) {
     const Image<float> cast = tests::RayCaster(field, camera).draw(2);
     int covered = 0;
     int different = 0;
@@ -81,6 +91,7 @@ class RendererTest : public testing::Test {
     EXPECT_LE(different, 2);
   }
   std::unique_ptr<Renderer> renderer_;
+  std::unique_ptr<Renderer> host_;
 };
 
 TEST_F(RendererTest, AgreesWithARayCasterStraightOn) {
@@ -156,6 +167,11 @@ TEST_F(RendererTest, AddsWhatTheSurfaceReflects) {
     for (int x = 0; x < camera.width; ++x)
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(after.at(x, y, c) - before.at(x, y, c), 0.5F * after.at(x, y, 3), 1e-5F);
+  const auto on_host = host_->draw(field, camera, {});
+  ASSERT_TRUE(on_host);
+  for (std::size_t i = 0; i < on_host->samples().size(); ++i) {
+    ASSERT_NEAR(on_host->samples()[i], after.samples()[i], 1e-4F * (1.0F + after.samples()[i]));
+  }
   top.reflected = Image<float>(1, 1, 3);
   EXPECT_FALSE(renderer_->draw(field, camera, {}));
 }
@@ -226,6 +242,21 @@ TEST_F(RendererTest, RefusesNumbersThatAreNone) {
   camera = look(kMiddle + Vec3{0, 0, 80}, kMiddle);
   camera.camera_from_sample.rotation[0] = 2.0;
   EXPECT_FALSE(renderer_->draw(smooth_field(), camera, {}));
+}
+
+TEST_F(RendererTest, WithoutADeviceItIsDrawnOnTheHostAllTheSame) {
+  RendererOptions nowhere;
+  nowhere.gpu.device.name = "no such device";
+  EXPECT_EQ(Renderer::create(nowhere).error().code, ErrorCode::kUnavailable);
+  const auto host = Renderer::create_or_host(nowhere, 2);
+  ASSERT_TRUE(host) << host.error().message;
+  EXPECT_THAT((*host)->description(), HasSubstr("host"));
+  const SurfaceField field = smooth_field();
+  const CameraModel camera = look(kMiddle + Vec3{50, 40, 45}, kMiddle);
+  const auto picture = (*host)->draw(field, camera, {});
+  ASSERT_TRUE(picture) << picture.error().message;
+  expect_as_ray_cast(field, camera, *picture);
+  EXPECT_FALSE((*host)->draw(field, look(kMiddle, kMiddle + Vec3{0, 0, 1}), {}));
 }
 
 TEST_F(RendererTest, StopsWhenAsked) {
