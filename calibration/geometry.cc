@@ -12,6 +12,7 @@
 #include "calibration/posing.h"
 #include "calibration/residuals.h"
 #include "calibration/step.h"
+#include "calibration/vignetting_fit.h"
 
 namespace opaline::calibration {
 namespace {
@@ -24,6 +25,8 @@ constexpr double kLeftOut = 0.4;
 constexpr double kFewestPoses = 8.0;
 constexpr double kUncovered = 0.5;
 constexpr double kFocalUnsure = 0.002;
+constexpr double kVignettingUnsure = 0.005;
+constexpr double kPaperUneven = 0.02;  // rms of its light: glossy, or lit by something else, too
 
 std::array<int, 2> camera_size(const StepContext& context) {
   return {context.taker.camera().width, context.taker.camera().height};
@@ -122,6 +125,37 @@ nlohmann::json values_of(const PairFit& fit,
           {"poses", std::move(poses)}};
 }
 
+// Taken over where it is told well; a board that cannot tell it (markers, few squares) leaves the rig file's.
+void note_vignetting(const PairFit& fit,
+                     const Poses& poses,
+                     Measured& measured,
+                     nlohmann::json& values) {
+  measured.camera_vignetting.reset();
+  measured.projector_vignetting.reset();
+  const auto found = fit_vignetting(fit, poses.paper);
+  if (!found) {
+    values["vignetting_not_told"] = found.error().message;
+    return;
+  }
+  values["vignetting_residual"] = found->residual;
+  values["vignetting_deviation"] = found->deviation;
+  values["camera_light_in_corners"] = found->at(0, 1.0);
+  values["projector_light_in_corners"] = found->at(1, 1.0);
+  if (std::ranges::max(found->deviation) > kVignettingUnsure || found->residual > kPaperUneven) {
+    values["vignetting_not_told"] = fmt::format(
+        "known to {:.2f} and {:.2f} %, the paper's light to {:.2f} %; at most {} and {} % are "
+        "taken over",
+        100.0 * found->deviation[0],
+        100.0 * found->deviation[1],
+        100.0 * found->residual,
+        100.0 * kVignettingUnsure,
+        100.0 * kPaperUneven);
+    return;
+  }
+  measured.camera_vignetting = capture::Vignetting{found->coefficients[0]};
+  measured.projector_vignetting = capture::Vignetting{found->coefficients[1]};
+}
+
 StepRecord too_few(StepRecord record, const Error& error) {
   record.gates.push_back({"too few poses", 2.0, 1.0, "", error.message});
   return record;
@@ -168,6 +202,7 @@ Result<StepRecord> geometry(StepContext& context) {
   record.values["residuals"] = residuals_of(*fit, board, poses->camera, poses->projector);
   context.record.measured.camera_lens = MeasuredLens{fit->joint_camera, fit->deviation[0]};
   context.record.measured.projector_lens = MeasuredLens{fit->joint_projector, fit->deviation[1]};
+  note_vignetting(*fit, *poses, context.record.measured, record.values);
   return record;
 }
 

@@ -109,7 +109,7 @@ Result<PosePair> take_pose(StepContext& context,
   Image<std::uint8_t> grey = grey_of(white->frame.pixels);
   auto before = find_board(grey, board, name);
   if (!before) return before.error();
-  if (!before->fault.empty()) return PosePair{*before, *before, std::move(grey)};
+  if (!before->fault.empty()) return PosePair{*before, *before, std::move(grey), {}};
   const auto map = take_patterns(context, name, white->code, brightness.turns);
   if (!map) return map.error();
   const auto last = context.taker.pictured(
@@ -123,8 +123,9 @@ Result<PosePair> take_pose(StepContext& context,
   const double moved = corners_moved(*before, *after).value_or(0.0);
   if (!after->fault.empty() || moved > kMayMove)
     camera->fault = fmt::format("moved board: by {:.2f} px while the patterns were shown", moved);
-  PosePair pose{*std::move(camera), {}, std::move(grey)};
+  PosePair pose{*std::move(camera), {}, std::move(grey), {}};
   pose.projector = projector_view(*map, pose.camera, board);
+  pose.paper = paper_light(map->mean, pose.camera, board);
   return pose;
 }
 

@@ -9,6 +9,7 @@
 #include "calibration/board.h"
 #include "calibration/phase_code.h"
 #include "calibration/step.h"
+#include "calibration/vignetting_fit.h"
 
 namespace opaline::calibration {
 
@@ -16,7 +17,8 @@ namespace opaline::calibration {
 struct PosePair {
   BoardView camera;
   BoardView projector;
-  Image<std::uint8_t> grey;  ///< in which the camera's corners were found
+  Image<std::uint8_t> grey;       ///< in which the camera's corners were found
+  std::vector<PaperLight> paper;  ///< its white squares
 };
 
 /// The median distance of corners that both have, px; none without such corners.

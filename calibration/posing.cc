@@ -196,6 +196,7 @@ Result<void> take_one(StepContext& context,
   if (!pose) return pose.error().in(name);
   poses.camera.push_back(pose->camera);
   poses.projector.push_back(pose->projector);
+  poses.paper.push_back(pose->paper);
   if (context.attendant != nullptr) {
     const PoseGuide guide = guide_of(context, poses);
     context.attendant->saw(PoseSight{pose->grey,
@@ -228,6 +229,7 @@ Result<Poses> take_poses(StepContext& context, const Brightness& brightness) {
             fmt::format("nobody came to hold the board for {} poses in a row ({})", nobody, doing));
       poses.camera.push_back(nobodys(name, doing));
       poses.projector.push_back(poses.camera.back());
+      poses.paper.emplace_back();
     } else {
       nobody = 0;
       if (auto taken = take_one(context, name, brightness, poses); !taken) return taken.error();

@@ -12,6 +12,7 @@ namespace opaline::calibration {
 struct Poses {
   std::vector<BoardView> camera;
   std::vector<BoardView> projector;
+  std::vector<std::vector<PaperLight>> paper;
 };
 
 /// How long a pose is waited for when a person holds the board; in real time, also where the station's clock is faster.

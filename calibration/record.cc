@@ -98,6 +98,8 @@ ordered_json to_json(const Measured& m) {
     out["exposure_factors"].push_back({{"reported_s", f.reported_s}, {"factor", f.factor}});
   if (m.camera_lens) out["camera_lens"] = to_json(*m.camera_lens);
   if (m.projector_lens) out["projector_lens"] = to_json(*m.projector_lens);
+  if (m.camera_vignetting) out["camera_vignetting"] = m.camera_vignetting->coefficients;
+  if (m.projector_vignetting) out["projector_vignetting"] = m.projector_vignetting->coefficients;
   return out;
 }
 
@@ -167,6 +169,12 @@ Measured measured_from(const json& in) {
     const auto found = in.find(key);
     return found == in.end() ? std::nullopt : std::optional(found->get<double>());
   };
+  const auto vignetting = [&](const char* key) {
+    const auto found = in.find(key);
+    return found == in.end()
+               ? std::nullopt
+               : std::optional(capture::Vignetting{found->get<std::array<double, 3>>()});
+  };
   Measured m;
   m.black_level = number("black_level");
   if (m.black_level) {
@@ -185,6 +193,8 @@ Measured measured_from(const json& in) {
     m.exposure_factors.push_back({f.at("reported_s").get<double>(), f.at("factor").get<double>()});
   if (in.contains("camera_lens")) m.camera_lens = lens_from(in.at("camera_lens"));
   if (in.contains("projector_lens")) m.projector_lens = lens_from(in.at("projector_lens"));
+  m.camera_vignetting = vignetting("camera_vignetting");
+  m.projector_vignetting = vignetting("projector_vignetting");
   return m;
 }
 
@@ -316,6 +326,8 @@ capture::StationCalibration with_measured(capture::StationCalibration given,
   }
   if (measured.projector_gamma) given.projector.gamma = *measured.projector_gamma;
   if (measured.projector_black) given.projector.black_level = *measured.projector_black;
+  if (measured.camera_vignetting) camera.vignetting = *measured.camera_vignetting;
+  if (measured.projector_vignetting) given.projector.vignetting = *measured.projector_vignetting;
   return given;
 }
 

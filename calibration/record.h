@@ -78,6 +78,8 @@ struct Measured {
   std::vector<capture::ExposureFactor> exposure_factors;  ///< empty: the camera reports them right
   std::optional<MeasuredLens> camera_lens;
   std::optional<MeasuredLens> projector_lens;
+  std::optional<capture::Vignetting> camera_vignetting;
+  std::optional<capture::Vignetting> projector_vignetting;
 };
 
 enum class RecordState : std::uint8_t { kIncomplete, kRefused, kAccepted };
@@ -111,8 +113,8 @@ std::string to_text(const Record& record);
 /// Errors: kInvalidArgument for what is damaged, saying where, or written by a newer version.
 Result<Record> record_from_text(std::string_view text, const std::string& file);
 
-/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times, hot pixels
-/// and lens, and the projector's gamma and black level, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
+/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times, hot pixels,
+/// vignetting and lens, and the projector's gamma, black level and vignetting, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
 /// who gave it had measured, stay as given.
 capture::StationCalibration with_measured(capture::StationCalibration given,
                                           const Measured& measured);

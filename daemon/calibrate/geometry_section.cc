@@ -14,6 +14,7 @@
 namespace opaline::daemon {
 namespace {
 
+using calibration::Measured;
 using calibration::MeasuredLens;
 using calibration::Record;
 using calibration::StepRecord;
@@ -280,6 +281,18 @@ void add_place(TableRows& rows,
   }
 }
 
+void add_vignetting(TableRows& rows,
+                    const std::string& lens,
+                    const std::optional<capture::Vignetting>& now,
+                    const std::optional<capture::Vignetting>& then) {
+  if (!now) return;
+  std::vector<std::string> row{lens + ": light in the picture's corners over its middle",
+                               fmt::format("{:.4f}", now->at(1.0)),
+                               ""};
+  if (then) row.insert(row.end(), {fmt::format("{:+.4f}", now->at(1.0) - then->at(1.0)), ""});
+  rows.push_back(std::move(row));
+}
+
 std::string lens_table(const Record& record, const std::optional<Record>& before) {
   TableRows rows;
   const auto camera = before ? before->measured.camera_lens : std::nullopt;
@@ -287,6 +300,9 @@ std::string lens_table(const Record& record, const std::optional<Record>& before
   add_lens(rows, "camera", record.measured.camera_lens, camera);
   add_lens(rows, "projector", record.measured.projector_lens, projector);
   add_place(rows, record.measured.projector_lens, projector);
+  const Measured old = before ? before->measured : Measured{};
+  add_vignetting(rows, "camera", record.measured.camera_vignetting, old.camera_vignetting);
+  add_vignetting(rows, "projector", record.measured.projector_vignetting, old.projector_vignetting);
   std::vector<std::string> header{"lens", "now", "deviation"};
   if (camera || projector)
     header.insert(header.end(),

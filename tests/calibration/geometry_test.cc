@@ -99,6 +99,18 @@ class GeometryTest : public ::testing::Test {
     return count;
   }
 
+  /// RMS over a picture of 4 : 3.
+  static double vignetting_off(const capture::Vignetting& is, const std::array<double, 3>& should) {
+    double squares = 0.0;
+    for (int y = -9; y <= 9; ++y) {
+      for (int x = -12; x <= 12; ++x) {
+        const double r2 = (x * x + y * y) / 225.0;
+        squares += std::pow(is.at(r2) - capture::Vignetting{should}.at(r2), 2) / (19.0 * 25.0);
+      }
+    }
+    return std::sqrt(squares);
+  }
+
   sim::RigOptions options_;
   sim::BoardSceneOptions scene_;
   GeometryOptions geometry_;
@@ -111,7 +123,8 @@ class GeometryTest : public ::testing::Test {
   Record record_;
 };
 
-// The limits on lengths and on what is left are the for a third of bad poses; the focal length's is four of its own deviations.
+// The limits on lengths and on what is left are the for a third of bad poses; the focal length's is four of its own deviations, the
+// vignetting's what a session takes over at most.
 TEST_F(GeometryTest, BadPosesAreNamedAndTheRestTellsTheLenses) {
   spoil_ = [](std::vector<sim::SimBoardPose>& poses) {
     poses[2].defocus_px = 2.5;
@@ -136,6 +149,10 @@ TEST_F(GeometryTest, BadPosesAreNamedAndTheRestTellsTheLenses) {
   const MeasuredLens& lens = *record_.measured.camera_lens;
   EXPECT_NEAR(lens.model.fx, options_.camera.model.fx, 4.0 * lens.deviation[0]);
   EXPECT_EQ(with_measured({}, record_.measured).camera.model.fx, lens.model.fx);
+  ASSERT_TRUE(record_.measured.camera_vignetting) << step.values.dump(1);
+  EXPECT_LT(vignetting_off(*record_.measured.camera_vignetting, options_.camera.vignetting), 0.005);
+  EXPECT_LT(vignetting_off(*record_.measured.projector_vignetting, options_.projector.vignetting),
+            0.005);
 }
 
 TEST_F(GeometryTest, WrongSquaresAreRefusedByName) {
@@ -180,11 +197,16 @@ TEST(GeometryRecord, LensesAreKeptOnDisk) {
   lens.model = sim::board_projector(640, 480);
   lens.deviation[4] = 0.25;
   record.measured.projector_lens = lens;
+  constexpr std::array<double, 3> vignetting{-0.12, 0.01, 0.0};
+  record.measured.camera_vignetting = capture::Vignetting{vignetting};
   const auto back = record_from_text(to_text(record), "calibration.json");
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(back->measured.projector_lens->model, lens.model);
   EXPECT_EQ(back->measured.projector_lens->deviation, lens.deviation);
   EXPECT_FALSE(back->measured.camera_lens);
+  EXPECT_EQ(back->measured.camera_vignetting->coefficients, vignetting);
+  EXPECT_FALSE(back->measured.projector_vignetting);
+  EXPECT_EQ(with_measured({}, back->measured).camera.vignetting.coefficients, vignetting);
 }
 
 }  // namespace
