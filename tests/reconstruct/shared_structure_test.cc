@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "reconstruct/diffusion/reference_solver.h"
@@ -25,8 +26,8 @@ Dataset clean_sample() {
   return make_synthetic_dataset({.block = {12, 12, 6, 1.0, 1.0, 1.0}, .noise = 0.0});
 }
 
-Dataset with_noise(Dataset dataset, double relative) {
-  std::mt19937 random(5);
+Dataset with_noise(Dataset dataset, double relative, std::uint32_t seed = 5) {
+  std::mt19937 random(seed);
   for (Illumination& i : dataset.illuminations) {
     auto radiance = i.radiance.samples();
     const float brightest = *std::max_element(radiance.begin(), radiance.end());
@@ -88,14 +89,25 @@ Distance distance(const Material& found) {
   return {std::sqrt(sums.reduced_scattering / count), std::sqrt(sums.absorption / count)};
 }
 
-// Seen: 0.23 against 0.29 and 0.48 against 0.58.
+void add(const Distance& one, Distance& sum) {
+  sum.reduced_scattering += one.reduced_scattering;
+  sum.absorption += one.absorption;
+}
+
+// In the mean of six noises, where seen: 0.24 against 0.28 and 0.48 against 0.58. With one noise alone it may be no better:
+// of twelve, three found log sigma_s' as well without the other channels.
 TEST(SharedStructure, FindsTheCoefficientsBetterWhereTheChannelsShareOneAndPicturesAreNoisy) {
-  const Dataset noisy = with_noise(clean_sample(), 0.1);
-  const auto shared = invert(noisy, Structure::kShared);
-  const auto separate = invert(noisy, Structure::kSeparate);
-  ASSERT_TRUE(shared && separate);
-  const Distance together = distance(shared->material);
-  const Distance alone = distance(separate->material);
+  const Dataset clean = clean_sample();
+  Distance together;
+  Distance alone;
+  for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+    const Dataset noisy = with_noise(clean, 0.1, seed);
+    const auto shared = invert(noisy, Structure::kShared);
+    const auto separate = invert(noisy, Structure::kSeparate);
+    ASSERT_TRUE(shared && separate);
+    add(distance(shared->material), together);
+    add(distance(separate->material), alone);
+  }
   EXPECT_LT(together.reduced_scattering, 0.9 * alone.reduced_scattering);
   EXPECT_LT(together.absorption, 0.9 * alone.absorption);
 }
