@@ -223,6 +223,25 @@ void ChartOptics::look() {
   }
 }
 
+void ChartOptics::shine(Image<float>& picture, const Rgb& shown) const {
+  if (options_.gloss_px <= 0.0) return;
+  const Eigen::Matrix3d to_chart = chart_from_picture(options_.corners);
+  const Eigen::Vector3d white = to_chart.inverse() * Eigen::Vector3d(0.5, 3.5, 1.0);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      if (std::hypot(x + 0.5 - white[0] / white[2], y + 0.5 - white[1] / white[2]) >
+          options_.gloss_px)
+        continue;
+      for (int c = 0; c < 3; ++c) {
+        const auto channel = static_cast<std::size_t>(c);
+        picture.at(x, y, c) +=
+            static_cast<float>(ChartOptions::kGloss * shown[channel] *
+                               projector_.peak_irradiance[channel] / std::numbers::pi);
+      }
+    }
+  }
+}
+
 StationLight ChartOptics::light(const Image<std::uint8_t>& codes) const {
   Rgb shown{};
   for (std::size_t i = 0; i < codes.samples().size(); ++i) {
@@ -242,6 +261,7 @@ StationLight ChartOptics::light(const Image<std::uint8_t>& codes) const {
           static_cast<float>(share.share * radiance / std::numbers::pi);
     }
   }
+  shine(picture, shown);
   light.sensor_radiance = blurred(picture, camera_.psf_sigma_px);
   return light;
 }

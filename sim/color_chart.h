@@ -29,6 +29,10 @@ struct ChartOptions {
   double patch_share = 0.82;  ///< of the distance between patches
   double frame = 0.03;        ///< reflectance of what is between them and half a patch around
   double wall = 0.2;          ///< of what is behind
+  /// Radius of the lamp's mirror image in the middle of the white patch, px, on which it is kGloss times as bright as a perfect
+  /// white; 0: the chart is matt.
+  double gloss_px = 0.0;
+  static constexpr double kGloss = 40.0;
 };
 
 /// A chart that lies a little askew in the middle of the picture, over half of its width.
@@ -50,6 +54,7 @@ class ChartOptics : public LightPath {
 
  private:
   void look();
+  void shine(Image<float>& picture, const Rgb& shown) const;
   CameraOptics camera_;
   ProjectorOptics projector_;
   ChartOptions options_;
