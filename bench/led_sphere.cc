@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "bench/led/ball_figures.h"
-#include "bench/led/blob_case.h"
 #include "bench/led/map_time.h"
 #include "bench/led/stage_figures.h"
 #include "bench/led/tradeoff.h"

@@ -7,9 +7,32 @@
 #include <utility>
 
 #include "bench/figure.h"
+#include "bench/led/stage_case.h"
 
 namespace opaline::bench {
 namespace {
+
+void print_reasons(const std::string& which, const StageErrors& e) {
+  for (std::size_t reason = 1; reason < e.reasons.size(); ++reason) {
+    if (!(e.reasons[reason] > 0.0)) continue;
+    const auto why = reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason));
+    print_figure("led.share_left_out", fmt::format("{}, {}", which, why), e.reasons[reason], "1");
+  }
+}
+
+void print_errors(const std::string& which, const StageErrors& e) {
+  print_figure("led.diffusion_error_mc", which, e.error_90, "1");
+  print_figure("led.scattering_error_mc", which, e.scattering_error_90, "1");
+  print_figure("led.albedo_error_mc", which, e.albedo_error, "1");
+  print_figure("led.stage_diffusion_bias", which, e.bias, "1");
+  print_figure("led.stage_diffusion_error", which, e.error, "1");
+  print_figure("led.coverage_2sigma", which, e.coverage, "1");
+  print_figure("led.stated_deviation", which, e.stated, "1");
+  print_figure("led.share_found", which, e.found, "1");
+  print_figure("led.normal_error_deg", which, e.normal_deg, "degrees");
+  print_figure("led.normal_error_deg", which + ", answered", e.answered_normal_deg, "degrees");
+  print_reasons(which, e);
+}
 
 /// Shares of the pixels that have an answer, and that have a wrong one: beyond two stated deviations.
 void print_extreme(const std::string& which, const StageErrors& e) {
@@ -22,44 +45,42 @@ void print_extreme(const std::string& which, const StageErrors& e) {
 
 }  // namespace
 
-void print_reasons(const std::string& which, const StageErrors& e) {
-  for (std::size_t reason = 1; reason < e.reasons.size(); ++reason) {
-    if (!(e.reasons[reason] > 0.0)) continue;
-    const auto why = reconstruct::to_string(static_cast<reconstruct::LeftOut>(reason));
-    print_figure("led.share_left_out", fmt::format("{}, {}", which, why), e.reasons[reason], "1");
-  }
-}
-
 void measure_stage(ThreadTeam& team, std::int64_t paths) {
   StageScene scene;
   scene.paths = paths;
   const StageCase stage(scene);
-  StageErrors mean;
-  constexpr int kRounds = 4;
-  for (int round = 1; round <= kRounds; ++round) {
+  for (const std::uint64_t noise_seed : {1, 2, 3, 4}) {
     StageShot shot;
-    shot.noise_seed = static_cast<std::uint64_t>(round);
-    const StageErrors e = stage.run(shot, team);
-    mean.bias += e.bias / kRounds;
-    mean.error += e.error / kRounds;
-    mean.coverage += e.coverage / kRounds;
-    mean.found += e.found / kRounds;
-    mean.normal_deg += e.normal_deg / kRounds;
-    mean.albedo_error += e.albedo_error / kRounds;
+    shot.noise_seed = noise_seed;
+    print_errors(fmt::format("stage, 4 frames, noise {}", noise_seed), stage.run(shot, team));
   }
-  const char* const which = "stage, 4 frames";
-  print_figure("led.normal_error_deg", which, mean.normal_deg, "degrees");
-  print_figure("led.coverage_2sigma", which, mean.coverage, "1");
-  print_figure("led.share_found", which, mean.found, "1");
-  print_figure("led.stage_diffusion_bias", which, mean.bias, "1");
-  print_figure("led.stage_diffusion_error", which, mean.error, "1");
-  print_figure("led.stage_albedo_error", which, mean.albedo_error, "1");
   StageShot halves;
   halves.split = true;
   const StageErrors shifted = stage.run({}, team);
   const StageErrors split = stage.run(halves, team);
   print_figure("led.shifted_less_split", "ln D, median", shifted.bias - split.bias, "1");
   print_figure("led.shifted_less_split", "one stated deviation", shifted.stated, "1");
+}
+
+void measure_blobs(ThreadTeam& team, std::int64_t paths_per_pixel, const std::string& only) {
+  for (const auto& [body, radius] : {std::pair{"ball", 10.0},
+                                     {"blob_a", 10.0},
+                                     {"blob_b", 10.0},
+                                     {"blob_c", 10.0},
+                                     {"blob_d", 8.0},
+                                     {"dent", 8.0}}) {
+    if (!only.empty() && only != body) continue;
+    StageScene scene;
+    scene.body = body;
+    scene.seed = 7;
+    scene.radii_mm = {radius};
+    scene.paths_per_pixel = paths_per_pixel;
+    const StageCase stage(scene);
+    StageShot shot;
+    shot.frames = 1'000'000;
+    print_errors(fmt::format("{}, noise-free", body), stage.run(shot, team));
+    print_errors(body, stage.run({}, team));
+  }
 }
 
 void measure_extremes(ThreadTeam& team, std::int64_t paths) {
