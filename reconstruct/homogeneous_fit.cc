@@ -297,7 +297,7 @@ Result<HomogeneousFit> fit_down_to(const ChannelProblem& problem,
   const auto coarse =
       problem.block.cell_count() > kSketchCells ? coarser_block(problem.block) : std::nullopt;
   if (!coarse) return sketched(fit);
-  const auto below = fit_down_to(coarsened(problem, *coarse), options, solver, stop);
+  auto below = fit_down_to(coarsened(problem, *coarse), options, solver, stop);
   if (!below) return below;
   auto found = fit.from(logs_of(below->reduced_scattering, below->absorption));
   if (found && !fit.explains(*found)) found = sketched(fit);

@@ -72,8 +72,10 @@ class BlockRays {
     for (int x = 0; x < camera_.width; ++x) {
       std::array<double, 4> sum{};
       for (int k = 0; k < samples * samples; ++k) {
-        const double at_x = x + (k % samples + 0.5) / samples;
-        const double at_y = y + (static_cast<double>(k / samples) + 0.5) / samples;
+        const int column = k % samples;
+        const int row = k / samples;
+        const double at_x = x + (column + 0.5) / samples;
+        const double at_y = y + (row + 0.5) / samples;
         const auto hit = meet(normalized(camera_.ray_direction({at_x, at_y})));
         if (hit) add(*hit, sum);
       }

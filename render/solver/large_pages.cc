@@ -2,16 +2,16 @@
 
 #include <sys/mman.h>
 
-#include <cstdint>
+#include <memory>
 
 namespace opaline::render {
 
-void prefer_large_pages(const void* memory, std::size_t bytes) noexcept {
-  constexpr std::uintptr_t kLarge = std::uintptr_t{1} << 21;
-  const auto first = (reinterpret_cast<std::uintptr_t>(memory) + kLarge - 1) & ~(kLarge - 1);
-  const auto last = (reinterpret_cast<std::uintptr_t>(memory) + bytes) & ~(kLarge - 1);
-  if (first >= last) return;
-  madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+void prefer_large_pages(void* memory, std::size_t bytes) noexcept {
+  constexpr std::size_t kLarge = std::size_t{1} << 21;
+  void* first = memory;
+  std::size_t left = bytes;
+  if (std::align(kLarge, kLarge, first, left) == nullptr) return;
+  madvise(first, left & ~(kLarge - 1), MADV_HUGEPAGE);
 }
 
 }  // namespace opaline::render
