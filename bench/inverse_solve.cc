@@ -360,6 +360,9 @@ int main(int argc, char** argv) try {
   app.add_option("--discrepancy", options.discrepancy);
   app.add_option("--stalled", options.stalled);
   app.add_option("--tolerance", options.tolerance);
+  app.add_flag("--grid-correction",
+               options.grid_correction,
+               "Fit to the pictures less what the grid leaves out");
   app.add_option("--max-iterations", options.max_iterations);
   app.add_option("--coarser-grids", options.coarser_grids);
   options.model = reconstruct::Model::kHeterogeneous;

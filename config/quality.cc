@@ -24,6 +24,7 @@ void apply(Quality quality, SessionConfig& s) {
       s.capture.exposures.planned_snr = 200.0;
       s.reconstruction.tolerance = 1e-6;
       s.reconstruction.max_iterations = 1000;
+      s.reconstruction.grid_correction = true;
       s.reconstruction.discrepancy = 0.0;
       s.reconstruction.stalled = 0.002;
       s.preview.samples_per_axis = 4;

@@ -12,6 +12,7 @@ namespace opaline::config {
 ///   capture.exposures.ratio, wanted_snr    8, 25  4, 50     2, 100
 ///   capture.exposures.planned_snr          50     100       200
 ///   reconstruction.grid_step               2      1         1
+///   reconstruction.grid_correction         no     no        yes
 ///   reconstruction.tolerance               1e-3   1e-5      1e-6
 ///   reconstruction.max_iterations          20     150       1000
 ///   reconstruction.discrepancy, stalled    0.1, 0.01        0, 0.002

@@ -164,6 +164,8 @@ void visit_reconstruction(Fields& fields, SessionConfig& session) {
   fields.whole({"coarser_grids", "that the answer is found on first"},
                r.coarser_grids,
                Range::between(0, 10));
+  fields.flag({"grid_correction", "fit to the pictures less what the grid leaves out of them"},
+              r.grid_correction);
   fields.whole({"max_iterations", "per channel and model; 0: the homogeneous fit"},
                r.max_iterations,
                Range::between(0, 100000));

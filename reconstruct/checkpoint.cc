@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFormat = 4;
+constexpr int kFormat = 5;
 constexpr std::size_t kLargestFile = std::size_t{4} << 30;
 static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
 
@@ -111,6 +111,7 @@ json to_json(const ChannelReport& r) {
           {"ladder", std::move(ladder)},
           {"held_out_noise", r.held_out_noise},
           {"cross_validated", r.cross_validated},
+          {"grid_correction", r.grid_correction},
           {"model", r.model},
           {"model_reason", r.model_reason}};
 }
@@ -128,6 +129,7 @@ ChannelReport report_from(const json& j) {
   for (const json& rung : j.at("ladder")) r.ladder.push_back(rung_from(rung));
   r.held_out_noise = j.at("held_out_noise").get<double>();
   r.cross_validated = j.at("cross_validated").get<bool>();
+  r.grid_correction = j.at("grid_correction").get<double>();
   r.model = j.at("model").get<std::string>();
   r.model_reason = j.at("model_reason").get<std::string>();
   return r;
@@ -167,6 +169,7 @@ json to_json(const LadderProgress& p) {
   return {{"report", to_json(p.report)},
           {"best", pack(p.best)},
           {"finishing", p.finishing},
+          {"correcting", p.correcting},
           {"current", p.current ? to_json(*p.current) : json()}};
 }
 
@@ -174,6 +177,7 @@ LadderProgress ladder_from(const json& j) {
   LadderProgress p{report_from(j.at("report")),
                    unpack(j.at("best")),
                    j.at("finishing").get<bool>(),
+                   j.at("correcting").get<bool>(),
                    std::nullopt};
   if (!j.at("current").is_null()) p.current = progress_from(j.at("current"));
   return p;
@@ -253,6 +257,7 @@ void append_options(std::vector<std::byte>& bytes, const InverseOptions& o) {
                            static_cast<double>(o.structure),
                            static_cast<double>(o.regularizer),
                            static_cast<double>(o.coarser_grids),
+                           static_cast<double>(o.grid_correction),
                            static_cast<double>(kFormat)};
   append(bytes, numbers.data(), sizeof numbers);
 }

@@ -24,6 +24,8 @@ struct LadderProgress {
   ChannelReport report;      ///< of the rungs so far; its history is that of those taken
   std::vector<double> best;  ///< cell values of the last one taken; empty: none yet
   bool finishing = false;  ///< the choice is made, the chosen model is fitted to all illuminations
+  bool correcting =
+      false;  ///< finishing with what the grid leaves out at `best` taken off the pictures
   std::optional<ChannelProgress> current;  ///< of the rung under way
 };
 

@@ -36,9 +36,9 @@ std::optional<ErrorBudget> error_budget(const Dataset& dataset,
                                         double discretisation,
                                         double held_out_variance);
 
-/// Error of the grid by Richardson's extrapolation, the scheme being of second order: 4/3 of what changes when every cell
-/// is cut into eight of the same coefficients, over at most four held-out lights.
-/// Errors: those of predict(); kInvalidArgument where nothing is held out.
+/// Error of the grid, relative to the pictures, over at most four held-out lights: grid_correction() or, where the answer
+/// was found with that (corrects_grid()), a quarter of it, the part that Richardson's rule adds unseen.
+/// Errors: those of grid_correction(); kInvalidArgument where nothing is held out.
 Result<double> discretisation_error(const Dataset& dataset,
                                     const Material& material,
                                     const InverseOptions& options,

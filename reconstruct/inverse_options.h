@@ -94,6 +94,9 @@ struct InverseOptions {
   Structure structure = Structure::kSeparate;  ///< not with Method::kAsPublished
   /// That a heterogeneous answer is found on first, each of half the cells an axis (reconstruct/coarse_start.h); >= 0.
   int coarser_grids = 2;
+  /// The last fit is to pictures less what the grid leaves out (reconstruct/grid_correction.h), and predictions count it;
+  /// where corrects_grid().
+  bool grid_correction = false;
   int max_iterations = 150;  ///< per channel and model; 0 keeps the homogeneous fit
   double tolerance = 1e-5;   ///< of every diffusion solve, relative residual; > 0
   /// Discrepancy principle (Morozov 1966): stop once chi^2 <= sum w (var + discrepancy (model_error hypot(L, l))^2), the

@@ -64,9 +64,10 @@ struct ChannelReport {
   std::vector<ModelReport> ladder;  ///< in the order they were tried
   double held_out_noise = 0.0;      ///< chi^2 per held-out datum that measured noise alone makes
   bool cross_validated =
-      false;                 ///< held out of the fit's own illuminations, the dataset having none
-  std::string model;         ///< the rung that the channel stands on: "layered"
-  std::string model_reason;  ///< why no finer one, one sentence
+      false;  ///< held out of the fit's own illuminations, the dataset having none
+  double grid_correction = 0.0;  ///< ||delta|| / ||L|| (reconstruct/grid_correction.h); 0: none
+  std::string model;             ///< the rung that the channel stands on: "layered"
+  std::string model_reason;      ///< why no finer one, one sentence
 };
 
 /// ||L - L*|| / ||L*|| over the usable cells of some illuminations, and what their noise alone

@@ -9,6 +9,7 @@
 
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/direct_light.h"
+#include "reconstruct/grid_correction.h"
 
 namespace opaline::reconstruct {
 namespace {
@@ -86,10 +87,15 @@ class Uncertainties {
  private:
   Result<void> add_channel(std::size_t c, const std::stop_token& stop) {
     const double begun = seconds();
-    const auto problem =
-        make_channel_problem(dataset_, static_cast<int>(c), options_, Selection::kFit);
+    auto problem = make_channel_problem(dataset_, static_cast<int>(c), options_, Selection::kFit);
     if (!problem) return problem.error();
     const ChannelCoefficients& estimate = material_.channels[c];
+    if (corrects_grid(options_, dataset_.block)) {
+      const auto correction =
+          grid_correction(*problem, estimate, options_.tolerance, context_.solver, stop);
+      if (!correction) return correction.error();
+      *problem = corrected(*std::move(problem), *correction);
+    }
     const auto held_out = held_out_problem(dataset_, static_cast<int>(c), options_);
     if (!held_out) return held_out.error();
     auto found = held_out->has_value()

@@ -14,7 +14,10 @@ namespace {
 
 constexpr std::size_t kFew = 4;  // illuminations that a model of few parameters is found from
 constexpr double kStalledBelow = 0.05;  // of a rung that is only a step on the way
-constexpr int kSketch = 6;              // iterations that show whether coarse cells gain anything
+// Where a fit ends that the grid's correction is found at: the correction hardly changes with the last of the misfit.
+constexpr double kRoughDiscrepancy = 0.1;
+constexpr double kRoughStalled = 0.01;
+constexpr int kSketch = 6;  // iterations that show whether coarse cells gain anything
 
 Model model_of(const InverseOptions& options) {
   if (options.max_iterations == 0) return Model::kHomogeneous;
@@ -169,6 +172,10 @@ const ModelRung& ModelLadder::best_rung() const {
 
 InverseOptions ModelLadder::options_of(const ModelRung& rung) const {
   InverseOptions own = options_;
+  if (corrects() && !progress_.correcting) {
+    own.discrepancy = std::max(own.discrepancy, kRoughDiscrepancy);
+    own.stalled = std::max(own.stalled, kRoughStalled);
+  }
   if (progress_.finishing || &rung == &rungs_.back()) return own;
   own.stalled = std::max(own.stalled, kStalledBelow);
   if (!has_few_parameters(rung)) own.max_iterations = std::min(own.max_iterations, kSketch);
@@ -303,25 +310,52 @@ void ModelLadder::take(const std::vector<double>& cell_values, const ChannelRepo
   own.target_per_datum = report.target_per_datum;
 }
 
+Result<void> ModelLadder::fit_to_all(const ChannelProblem& problem, std::stop_token stop) {
+  const ModelRung& rung = best_rung();
+  ChannelReport& report = progress_.report;
+  if (rung.model == Model::kHomogeneous) {
+    auto fit = refine_homogeneous(problem, options_, report.homogeneous, solver_, std::move(stop));
+    if (!fit) return fit.error();
+    const auto count = static_cast<double>(problem.data_count);
+    progress_.best = constant(problem.block, *fit);
+    report.solves += fit->solves - report.homogeneous.solves;
+    report.data_count = problem.data_count;
+    report.noise_per_datum = noise_of(problem);
+    report.history = {{0, 0.5 * fit->chi_squared, fit->chi_squared / count, 0.0, report.solves}};
+    report.homogeneous = *fit;
+    return ok();
+  }
+  const auto fitted = minimise(problem, rung, std::move(stop));
+  if (!fitted) return fitted.error();
+  report.solves = fitted->report.solves;
+  take(rung.parametrization.expand(fitted->state.x), fitted->report);
+  return ok();
+}
+
+Result<void> ModelLadder::correct(std::stop_token stop) {
+  const auto correction =
+      grid_correction(all_, to_coefficients(progress_.best), options_.tolerance, solver_, stop);
+  if (!correction) return correction.error().in("correction of the grid");
+  progress_.report.grid_correction = power(all_, *correction).relative();
+  if (!progress_.current) progress_.report.solves += correction->solves;
+  return fit_to_all(corrected(all_, *correction), std::move(stop));
+}
+
 Result<void> ModelLadder::finish(std::stop_token stop) {
   const auto start = clock_.now();
   const ModelRung& rung = best_rung();
   ChannelReport& report = progress_.report;
-  if (rung.model == Model::kHomogeneous) {
-    auto fit = refine_homogeneous(all_, options_, report.homogeneous, solver_, std::move(stop));
-    if (!fit) return fit.error();
-    const auto count = static_cast<double>(all_.data_count);
-    progress_.best = constant(all_.block, *fit);
-    report.solves += fit->solves - report.homogeneous.solves;
-    report.data_count = all_.data_count;
-    report.noise_per_datum = noise_of(all_);
-    report.history = {{0, 0.5 * fit->chi_squared, fit->chi_squared / count, 0.0, report.solves}};
-    report.homogeneous = *fit;
-  } else if (&rung != &rungs_.back() || has_few_parameters(rung) || report.cross_validated) {
-    const auto fitted = minimise(all_, rung, std::move(stop));
-    if (!fitted) return fitted.error();
-    report.solves = fitted->report.solves;
-    take(rung.parametrization.expand(fitted->state.x), fitted->report);
+  const bool fitted_to_all =
+      &rung == &rungs_.back() && !has_few_parameters(rung) && !report.cross_validated;
+  if (!fitted_to_all && !progress_.correcting) {
+    if (auto fitted = fit_to_all(all_, stop); !fitted) return fitted;
+  }
+  if (corrects()) {
+    if (!progress_.correcting) {
+      progress_.correcting = true;
+      if (auto saved = hooks_.checkpoint(progress_); !saved) return saved;
+    }
+    if (auto fitted = correct(std::move(stop)); !fitted) return fitted;
   }
   report.seconds += std::chrono::duration<double>(clock_.now() - start).count();
   return ok();

@@ -11,6 +11,7 @@
 #include "reconstruct/channel_solver.h"
 #include "reconstruct/checkpoint.h"
 #include "reconstruct/diffusion/fluence_solver.h"
+#include "reconstruct/grid_correction.h"
 #include "reconstruct/illumination_subset.h"
 #include "reconstruct/model_choice.h"
 
@@ -28,7 +29,8 @@ namespace opaline::reconstruct {
 ///
 /// The held-out error of the rung that is taken is a little too good, being the best of at most four. Two numbers, or two
 /// a layer, need few pictures: those rungs are fitted to four; coarse cells get six iterations. Whichever rung is the
-/// answer is then fitted to the end, to all. A choice other than
+/// answer is then fitted to the end, to all; where corrects_grid(), roughly first, and to the end with what the grid leaves
+/// out at that answer taken off the pictures. A choice other than
 /// Model::kAuto takes its rungs unasked; their held-out errors are found all the same. Where nothing can be held out
 /// (fewer than three illuminations) kAuto is kHeterogeneous.
 ///
@@ -76,10 +78,13 @@ class ModelLadder {
                      std::stop_token stop);
   void decide(ModelReport& report, const Misfit& held_out) const;
   Result<void> finish(std::stop_token stop);
+  Result<void> fit_to_all(const ChannelProblem& problem, std::stop_token stop);
+  Result<void> correct(std::stop_token stop);
   Result<Misfit> predict(const ChannelProblem& problem,
                          const std::vector<double>& cell_values,
                          std::stop_token stop);
   InverseOptions options_of(const ModelRung& rung) const;
+  bool corrects() const { return corrects_grid(options_, all_.block); }
   void take(const std::vector<double>& cell_values, const ChannelReport& report);
   const ModelRung& best_rung() const;
   bool can_validate() const { return split_.held_out.data_count > 0; }

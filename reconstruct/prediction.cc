@@ -1,9 +1,30 @@
 #include "reconstruct/prediction.h"
 
 #include "reconstruct/channel_problem.h"
+#include "reconstruct/grid_correction.h"
 #include "reconstruct/objective.h"
 
 namespace opaline::reconstruct {
+namespace {
+
+using Radiances = std::vector<std::vector<double>>;  // per illumination on the seen face's cells
+
+Result<Radiances> radiances(const ChannelProblem& problem,
+                            const ChannelCoefficients& coefficients,
+                            const InverseOptions& options,
+                            diffusion::FluenceSolver& solver,
+                            const std::stop_token& stop) {
+  if (!corrects_grid(options, problem.block))
+    return Objective(problem, solver, {options.tolerance, 0.0}).predict(coefficients, stop);
+  auto found = grid_correction(problem, coefficients, options.tolerance, solver, stop);
+  if (!found) return found.error();
+  Radiances sum = std::move(found->predicted);
+  for (std::size_t m = 0; m < sum.size(); ++m)
+    for (std::size_t x = 0; x < sum[m].size(); ++x) sum[m][x] += found->change[m][x];
+  return sum;
+}
+
+}  // namespace
 
 Result<void> predict_channel(const Dataset& dataset,
                              const ChannelCoefficients& coefficients,
@@ -14,8 +35,7 @@ Result<void> predict_channel(const Dataset& dataset,
                              std::stop_token stop) {
   const auto problem = make_channel_problem(dataset, channel, options, Selection::kAll);
   if (!problem) return problem.error();
-  Objective objective(*problem, solver, {options.tolerance, 0.0});
-  const auto radiance = objective.predict(coefficients, std::move(stop));
+  const auto radiance = radiances(*problem, coefficients, options, solver, stop);
   if (!radiance) return radiance.error();
   for (std::size_t m = 0; m < radiance->size(); ++m) {
     for (std::size_t x = 0; x < (*radiance)[m].size(); ++x) {

@@ -12,7 +12,8 @@ namespace opaline::reconstruct {
 
 /// The radiance that a material sends towards the camera under one channel of every illumination of the dataset,
 /// held-out ones too; writes that channel of `pictures` (one a illumination, over the seen face, three channels).
-/// The dataset's pictures and masks are not used; of the options, the model and the tolerance.
+/// The dataset's pictures and masks are not used; of the options, the model, the tolerance and whether the grid is corrected
+/// for (corrects_grid()).
 Result<void> predict_channel(const Dataset& dataset,
                              const ChannelCoefficients& coefficients,
                              int channel,

@@ -12,6 +12,7 @@
 #include "bench/figure.h"
 #include "reconstruct/channel_problem.h"
 #include "reconstruct/error_budget.h"
+#include "reconstruct/grid_correction.h"
 #include "reconstruct/posterior.h"
 
 namespace opaline::bench {
@@ -146,9 +147,15 @@ Result<void> print_posterior(const std::string& name,
     const auto c = static_cast<std::size_t>(channel);
     const ChannelCoefficients& is = result.material.channels[c];
     const ChannelCoefficients& was = truth.channels[c];
-    const auto problem =
+    auto problem =
         reconstruct::make_channel_problem(dataset, channel, options, reconstruct::Selection::kFit);
     if (!problem) return problem.error();
+    if (reconstruct::corrects_grid(options, dataset.block)) {
+      const auto correction =
+          reconstruct::grid_correction(*problem, is, options.tolerance, solver, {});
+      if (!correction) return correction.error();
+      *problem = reconstruct::corrected(*std::move(problem), *correction);
+    }
     const auto start = clock.now();
     const auto held_out = reconstruct::held_out_problem(dataset, channel, options);
     if (!held_out) return held_out.error();

@@ -123,9 +123,12 @@ TEST(InverseSolver, RecoversAHomogeneousSample) {
   EXPECT_GT(interval[1], result->channels[0].homogeneous.reduced_scattering);
 }
 
-TEST(InverseSolver, GivesTheSameBitsWhenInterruptedAnywhere) {
+class InterruptedInverseSolver : public ::testing::TestWithParam<bool> {};
+
+TEST_P(InterruptedInverseSolver, GivesTheSameBitsAsOneThatWasNot) {
   const Dataset dataset = make_synthetic_dataset(tiny());
   InverseOptions options;
+  options.grid_correction = GetParam();
   options.checkpoint_every = 3;
   options.max_iterations = 8;
   options.discrepancy = 0.0;
@@ -144,7 +147,10 @@ TEST(InverseSolver, GivesTheSameBitsWhenInterruptedAnywhere) {
   EXPECT_EQ(resumed->material, whole->material);
   EXPECT_EQ(resumed->predicted, whole->predicted);
   EXPECT_EQ(resumed->channels[1].history, whole->channels[1].history);
+  EXPECT_EQ(resumed->channels[1].grid_correction, whole->channels[1].grid_correction);
+  EXPECT_EQ(resumed->channels[1].solves, whole->channels[1].solves);
 }
+INSTANTIATE_TEST_SUITE_P(GridCorrection, InterruptedInverseSolver, ::testing::Bool());
 
 TEST(InverseSolver, StartsAgainFromADamagedOrForeignCheckpoint) {
   const Dataset dataset = make_synthetic_dataset(tiny());
