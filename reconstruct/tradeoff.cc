@@ -99,6 +99,7 @@ std::string describe(const TradeoffSetting& s) {
   if (s.options.back_end == BackEnd::kHost) text += fmt::format(", {}", to_string(s.precision));
   if (s.dial == "iterations" || s.dial == "optimiser")
     text += fmt::format(", {} iterations", s.options.max_iterations);
+  if (s.options.grid_correction) text += ", grid corrected";
   return text;
 }
 
@@ -117,6 +118,7 @@ TradeoffPlan plan_tradeoff(const Dataset& dataset, bool quick) {
   plan.methods = {Method::kLbfgs, Method::kGaussNewton, Method::kAsPublished};
   plan.back_ends = {BackEnd::kVulkan, BackEnd::kReference};
   plan.precisions = {diffusion::Precision::kHalf, diffusion::Precision::kDouble};
+  plan.grid_correction = true;
   return plan;
 }
 
@@ -160,6 +162,8 @@ std::vector<TradeoffSetting> settings_of(const TradeoffPlan& plan, const Inverse
     turn("precision", [](InverseOptions&) {});
     all.back().precision = precision;
   }
+  if (plan.grid_correction && !options.grid_correction)
+    turn("grid correction", [](InverseOptions& o) { o.grid_correction = true; });
   std::ranges::stable_sort(all, {}, cost);
   return all;
 }

@@ -35,6 +35,8 @@ struct TradeoffPlan {
   std::vector<Method> methods;
   std::vector<BackEnd> back_ends;
   std::vector<diffusion::Precision> precisions;
+  bool grid_correction =
+      false;  ///< also with what the grid leaves out, if the settings are without
 };
 
 /// For a dataset of n x n regions: n, n/2, ... 1; the whole grid, half, a quarter of it; and all else there is. `quick`

@@ -36,13 +36,16 @@ TEST_F(TradeoffTest, PlansEachSettingOnceAndTheCheapOnesFirst) {
   const auto settings = settings_of(plan, {});
   std::set<std::string> names;
   std::size_t given = 0;
+  std::size_t corrected = 0;
   for (const TradeoffSetting& s : settings) {
     EXPECT_TRUE(names.insert(s.dial + describe(s)).second) << describe(s);
     given += s.dial == "given" ? 1 : 0;
+    corrected += s.options.grid_correction ? 1 : 0;
     EXPECT_TRUE(validate(s.options)) << describe(s);
     EXPECT_TRUE(validate(s.reduction)) << describe(s);
   }
   EXPECT_EQ(given, 1u);
+  EXPECT_EQ(corrected, 1u);
   EXPECT_EQ(settings.front().reduction.regions, 1);
   EXPECT_EQ(settings.front().reduction.grid_step, 4.0);
   EXPECT_LT(settings_of(plan_tradeoff(dataset(), true), {}).size(), settings.size());
