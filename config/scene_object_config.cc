@@ -147,6 +147,8 @@ void visit_material(Fields& fields, TranslucentOptions& m) {
                   m.scale,
                   Range{.min = 1e-6, .max = 1e6});
     fields.one_of({"tiling", "beyond the block"}, m.tiling, kTilings);
+    fields.path({"surface_reflectance", "what its session measured, an .exr; empty: none"},
+                m.surface_reflectance);
   }
   if (m.file.empty()) {
     visit_coefficients(fields, m.absorption, m.reduced_scattering);

@@ -99,7 +99,7 @@ class RasterMesh {
   RasterMesh(const SceneRenderer::DrawnObject& object, int number, RasterGeometry& geometry)
       : mesh_(object.surface->mesh()),
         normals_(object.surface->normals()),
-        sky_(object.look->sky),
+        look_(*object.look),
         number_(number),
         geometry_(geometry) {}
 
@@ -123,15 +123,19 @@ class RasterMesh {
  private:
   std::uint32_t add_vertex(int v, Vec3 normal) {
     const auto added = static_cast<std::uint32_t>(geometry_.vertices.size());
-    geometry_.vertices.push_back(
-        {vec4(mesh_.vertices[v], number_), vec4(normal, sky_.empty() ? 1.0 : sky_[v])});
+    geometry_.vertices.push_back({vec4(mesh_.vertices[v], number_),
+                                  vec4(normal, look_.sky.empty() ? 1.0 : look_.sky[v]),
+                                  vec4(!look_.translucent     ? look_.reflectance
+                                       : look_.finish.empty() ? Colour{}
+                                                              : look_.finish[v],
+                                       0.0)});
     geometry_.sources.push_back({number_, v});
     return added;
   }
 
   const TriangleMesh& mesh_;
   const std::vector<Vec3>& normals_;
-  const std::vector<float>& sky_;
+  const Look& look_;
   int number_;
   RasterGeometry& geometry_;
 };
@@ -175,7 +179,7 @@ std::vector<RasterObject> raster_objects(const std::vector<SceneRenderer::DrawnO
                      static_cast<float>(look.ior),
                      static_cast<float>(look.surface.specular),
                      static_cast<float>(look.surface.roughness)},
-                    vec4(look.reflectance, look.mark_radiance)});
+                    vec4(Vec3{}, look.mark_radiance)});
   }
   return made;
 }

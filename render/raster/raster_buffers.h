@@ -24,11 +24,12 @@ struct RasterLight {
 };
 struct RasterObject {
   Vec4f optics;
-  Vec4f reflectance;
+  Vec4f marks;
 };
 struct RasterVertex {
   Vec4f place;
   Vec4f normal;
+  Vec4f matte;
 };
 struct RasterGlow {
   std::array<float, 3> fluence;

@@ -6,23 +6,7 @@
 namespace opaline::render {
 namespace {
 
-/// The two cells around a coordinate in cells, and the share of the second.
-struct CellSpan {
-  int low = 0;
-  int high = 0;
-  double share = 0.0;
-};
-
-CellSpan span_at(double coordinate, int cells, Tiling tiling) {
-  const double place = tiled(coordinate, cells, tiling);
-  const int low = static_cast<int>(std::floor(place));
-  const double share = place - low;
-  if (tiling == Tiling::kRepeat) return {(low + cells) % cells, (low + 1 + cells) % cells, share};
-  return {std::clamp(low, 0, cells - 1), std::clamp(low + 1, 0, cells - 1), share};
-}
-
-}  // namespace
-
+/// Where a coordinate beyond 0 to n - 1 is looked up: a place between cell centres again.
 double tiled(double coordinate, int cells, Tiling tiling) {
   switch (tiling) {
     case Tiling::kClamp:
@@ -35,6 +19,16 @@ double tiled(double coordinate, int cells, Tiling tiling) {
   const double turn =
       coordinate + 0.5 - 2.0 * cells * std::floor((coordinate + 0.5) / (2.0 * cells));
   return (turn < cells ? turn : 2.0 * cells - turn) - 0.5;
+}
+
+}  // namespace
+
+CellSpan span_at(double coordinate, int cells, Tiling tiling) {
+  const double place = tiled(coordinate, cells, tiling);
+  const int low = static_cast<int>(std::floor(place));
+  const double share = place - low;
+  if (tiling == Tiling::kRepeat) return {(low + cells) % cells, (low + 1 + cells) % cells, share};
+  return {std::clamp(low, 0, cells - 1), std::clamp(low + 1, 0, cells - 1), share};
 }
 
 Coefficients looked_up(const Material& material, Vec3 place, const std::array<Tiling, 3>& tiling) {

@@ -31,7 +31,12 @@ struct Coefficients {
 /// Trilinear between the centres of a block's cells, and beyond them by tiling along x, y, z; `place` in the block's frame, mm.
 Coefficients looked_up(const Material& material, Vec3 place, const std::array<Tiling, 3>& tiling);
 
-/// Where a coordinate beyond 0 to n - 1 is looked up, by tiling: a place between cell centres again.
-double tiled(double coordinate, int cells, Tiling tiling);
+/// The two cells around a coordinate in cells, 0 the middle of the first, and the share of the second.
+struct CellSpan {
+  int low = 0;
+  int high = 0;
+  double share = 0.0;
+};
+CellSpan span_at(double coordinate, int cells, Tiling tiling);
 
 }  // namespace opaline::render

@@ -32,6 +32,17 @@ Vec3 facing(Vec3 normal, Vec3 view) {
   return normalized(normal + view * (kGrazing - cosine));
 }
 
+/// What Lambert's reflectance is there.
+Colour matte_of(const Look& look, const Surfaces::Hit& hit) {
+  if (!look.translucent) return look.reflectance;
+  Colour matte{};
+  for (int k = 0; k < 3 && !look.finish.empty(); ++k) {
+    const Colour& corner = look.finish[hit.vertices[k]];
+    for (int c = 0; c < 3; ++c) matte[c] += hit.weights[k] * corner[c];
+  }
+  return matte;
+}
+
 bool differs(const Painter::Seen& a, const Painter::Seen& b) {
   if (a.object != b.object) return true;
   for (int c = 0; c < 3; ++c) {
@@ -68,16 +79,18 @@ Colour Painter::emerging(const Look& look, const Surfaces::Hit& hit, double cosi
   return radiance;
 }
 
-Colour Painter::scattered(const Look& look, const Surfaces::Hit& hit) const {
+Colour Painter::scattered(const Look& look, const Surfaces::Hit& hit, const Colour& matte) const {
+  if (is_black(environment_.radiance)) return {};
   double sky = 0.0;
   for (int k = 0; k < 3; ++k) sky += hit.weights[k] * look.sky[hit.vertices[k]];
   Colour radiance{};
-  for (int c = 0; c < 3; ++c) radiance[c] = look.reflectance[c] * sky * environment_.radiance[c];
+  for (int c = 0; c < 3; ++c) radiance[c] = matte[c] * sky * environment_.radiance[c];
   return radiance;
 }
 
 void Painter::add_mirrored(const Look& look,
                            const Surfaces::Hit& hit,
+                           const Colour& matte,
                            Vec3 view,
                            Colour& radiance) const {
   for (const LightOptions& light : lights_) {
@@ -85,11 +98,10 @@ void Painter::add_mirrored(const Look& look,
     const double cosine = dot(hit.normal, from.towards);
     if (!(cosine > 0.0) || is_black(from.irradiance)) continue;
     const double mirrored = specular_brdf(look.surface, look.ior, hit.normal, from.towards, view);
-    if (look.translucent && mirrored == 0.0) continue;
+    if (is_black(matte) && mirrored == 0.0) continue;
     if (light.shadows && surfaces_.hides(hit.start, from.towards, from.distance)) continue;
     for (int c = 0; c < 3; ++c) {
-      const double matte = look.translucent ? 0.0 : look.reflectance[c] / std::numbers::pi;
-      radiance[c] += (matte + mirrored) * cosine * from.irradiance[c];
+      radiance[c] += (matte[c] / std::numbers::pi + mirrored) * cosine * from.irradiance[c];
     }
   }
   if (is_black(environment_.radiance) || look.ior == 1.0 ||
@@ -115,9 +127,13 @@ Painter::Seen Painter::look(const Ray& ray) const {
   if (is_marked(look, *hit)) {
     return {.radiance = {look.mark_radiance, 0.0, look.mark_radiance}, .object = hit->object};
   }
-  seen.radiance =
-      look.translucent ? emerging(look, *hit, dot(hit->normal, view)) : scattered(look, *hit);
-  add_mirrored(look, *hit, view, seen.radiance);
+  const Colour matte = matte_of(look, *hit);
+  if (!is_black(matte)) seen.radiance = scattered(look, *hit, matte);
+  if (look.translucent) {
+    const Colour inner = emerging(look, *hit, dot(hit->normal, view));
+    for (int c = 0; c < 3; ++c) seen.radiance[c] += inner[c];
+  }
+  add_mirrored(look, *hit, matte, view, seen.radiance);
   return seen;
 }
 

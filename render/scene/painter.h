@@ -18,6 +18,8 @@ struct Look {
   double ior = 1.3;
   SurfaceOptions surface{};
   Colour reflectance{};  ///< of an opaque one
+  std::vector<Colour>
+      finish{};  ///< of the vertices of a translucent one whose surface was measured: pi rho_s
   SurfaceLight light{};  ///< of a translucent one's vertices
   std::vector<float>
       marks{};  ///< of its vertices; above 1/2: shown in magenta, as wrong. Empty: none
@@ -30,6 +32,7 @@ struct Look {
 ///
 ///   translucent   F_t(mu_o) / (4 pi ior^2) (phi + 3 mu_i J_n)         (docs/physics.md, "Radiance towards a camera")
 ///   opaque        rho / pi (sum of lights E (n.l) + pi L_env share)                                      (Lambert)
+///   measured      the same with rho = pi rho_s, on top of the translucent one's own               (measured_finish.h)
 ///   both          + sum of lights f_s E (n.l)  + R(mu_o) L_env where the mirrored ray meets nothing       (specular.h)
 ///
 /// phi, J_n, the share and the normal interpolated between a triangle's corners; lights that something hides count nothing.
@@ -64,8 +67,12 @@ class Painter {
 
  private:
   Colour emerging(const Look& look, const Surfaces::Hit& hit, double cosine) const;
-  Colour scattered(const Look& look, const Surfaces::Hit& hit) const;
-  void add_mirrored(const Look& look, const Surfaces::Hit& hit, Vec3 view, Colour& radiance) const;
+  Colour scattered(const Look& look, const Surfaces::Hit& hit, const Colour& matte) const;
+  void add_mirrored(const Look& look,
+                    const Surfaces::Hit& hit,
+                    const Colour& matte,
+                    Vec3 view,
+                    Colour& radiance) const;
 
   const Surfaces& surfaces_;
   const std::vector<Look>& looks_;

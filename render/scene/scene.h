@@ -58,6 +58,8 @@ struct TranslucentOptions {
   Colour reduced_scattering{1.0, 1.0, 1.0};
   PatternOptions pattern;
   double ior = 1.3;  ///< 1 to 3; a file brings its own
+  std::filesystem::path
+      surface_reflectance;  ///< of the file's session (render/scene/measured_finish.h); empty: none
   int edit_cells =
       96;  ///< along the longest side of the block that strokes go into, where there is no file; 1 to 1024
 };

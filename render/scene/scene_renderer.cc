@@ -87,6 +87,7 @@ Result<void> SceneRenderer::add_translucent(const ObjectOptions& object,
   statistics_.objects.push_back({object.name, true, drawn.mesh().triangles.size(), report});
   looks_.push_back({.translucent = true, .ior = (*body)->ior(), .surface = object.surface});
   looks_.back().marks = (*body)->marks();
+  looks_.back().finish = (*body)->finish();
   bodies_.push_back({*std::move(body), number});
   opaque_.emplace_back();
   return ok();

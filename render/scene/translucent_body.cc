@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numbers>
 
 #include "base/io/volume_io.h"
 #include "render/edit/material_block.h"
 #include "render/graph/quad_graph.h"
+#include "render/scene/measured_finish.h"
 
 namespace opaline::render {
 namespace {
@@ -53,6 +55,7 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
   body->rest_box_ = body->own_box(0.0);
   body->drawn_ =
       std::make_unique<DrawnSurface>(body->subsurface_->surface(), *body->solid_, refinement);
+  if (auto taken = body->take_finish(); !taken) return taken.error();
   if (!object.edits.empty()) {
     if (auto edited = body->edit(object.edits); !edited) return edited.error();
   }
@@ -79,6 +82,18 @@ Vec3 TranslucentBody::own_place(int vertex) const {
 
 Vec3 TranslucentBody::own_normal(int vertex) const {
   return scene_from_own_.inverse().rotate(drawn_->rest_normal(vertex));
+}
+
+Result<void> TranslucentBody::take_finish() {
+  if (options_.surface_reflectance.empty()) return ok();
+  const auto finish = MeasuredFinish::create(options_);
+  if (!finish) return finish.error();
+  finish_.reserve(drawn_->mesh().vertices.size());
+  for (int v = 0; v < static_cast<int>(drawn_->mesh().vertices.size()); ++v) {
+    Colour& matte = finish_.emplace_back(finish->at(own_place(v), own_normal(v)));
+    for (double& value : matte) value *= std::numbers::pi;
+  }
+  return ok();
 }
 
 Result<void> TranslucentBody::begin_editing() {

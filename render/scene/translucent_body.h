@@ -63,9 +63,12 @@ class TranslucentBody {
   Result<std::size_t> bend(const DeformOptions& options);
   /// Of each drawn vertex: above 1/2 where the object is turned inside out. Empty: nowhere.
   const std::vector<float>& marks() const { return marks_; }
+  /// Of each drawn vertex pi rho_s where the options name a measured surface (measured_finish.h); else empty.
+  const std::vector<Colour>& finish() const { return finish_; }
 
  private:
   TranslucentBody() = default;
+  Result<void> take_finish();
   Result<void> begin_editing();
   Result<void> take_material();
   Box own_box(double margin) const;
@@ -82,6 +85,7 @@ class TranslucentBody {
   Vec3 block_origin_;
   Box rest_box_;
   std::vector<float> marks_;
+  std::vector<Colour> finish_;
   std::vector<std::string> notes_;
   double load_seconds_ = 0.0;
 };

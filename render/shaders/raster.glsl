@@ -8,11 +8,12 @@ struct Light {
 };
 struct Object {
   vec4 optics;       // 1: translucent, ior, specular model (0 none, 1 Cook-Torrance, 2 Ward), roughness
-  vec4 reflectance;  // of an opaque one; w: radiance of marks
+  vec4 marks;        // w: their radiance
 };
 struct Vertex {
   vec4 place;   // w: its object
   vec4 normal;  // w: the share of the sky it sees
+  vec4 matte;   // Lambert's reflectance
 };
 struct Glow {
   float fluence[3];  // phi, W/mm^2

@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // The radiance of a surface towards the camera, W/(mm^2 sr), and 1: the twin of render/scene/painter.cc.
 //   translucent  F_t(mu_o) / (4 pi ior^2) (phi + 3 mu_i J_n);  opaque  rho / pi (sum of lights E (n.l) + pi L_env share)
+//   measured     the same with rho = pi rho_s, on top of the translucent one's own
 //   both         + sum of lights f_s E (n.l) + R(mu_o) L_env share
 // Where painter.cc sends rays, lights are looked up in shadow maps, and what hides the mirrored environment is the share of
 // the sky that the place sees.   set 0: as surface.vert
@@ -21,7 +22,7 @@ layout(location = 2) in vec3 fluence;
 layout(location = 3) in vec3 flux;
 layout(location = 4) in vec2 sky_mark;
 layout(location = 5) flat in vec4 optics;
-layout(location = 6) flat in vec4 reflectance;
+layout(location = 6) in vec4 matte;  // w: radiance of marks
 layout(location = 0) out vec4 radiance;
 
 const float kPi = 3.14159265358979;
@@ -105,7 +106,7 @@ float mirrored_share(vec3 n, vec3 l, vec3 v) {
 void main() {
   const bool translucent = optics.x > 0.0;
   if (sky_mark.y > 0.5) {
-    radiance = vec4(reflectance.w, 0.0, reflectance.w, 1.0);
+    radiance = vec4(matte.w, 0.0, matte.w, 1.0);
     return;
   }
   const vec3 v = normalize(eye.xyz - place);
@@ -115,12 +116,10 @@ void main() {
   if (off < kGrazing) n = normalize(n + v * (kGrazing - off));
   const float cosine = min(1.0, dot(n, v));
   const float ior = optics.y;
-  vec3 sum;
+  vec3 sum = matte.rgb * environment.rgb * sky_mark.x;
   if (translucent) {
     const float inside = sqrt(max(0.0, 1.0 - (1.0 - cosine * cosine) / (ior * ior)));
-    sum = max(vec3(0.0), fluence + 3.0 * inside * flux) * ((1.0 - fresnel(cosine, ior)) / (4.0 * kPi * ior * ior));
-  } else {
-    sum = reflectance.rgb * environment.rgb * sky_mark.x;
+    sum += max(vec3(0.0), fluence + 3.0 * inside * flux) * ((1.0 - fresnel(cosine, ior)) / (4.0 * kPi * ior * ior));
   }
   for (int k = 0; k < int(eye.w); ++k) {
     vec3 l;
@@ -128,8 +127,7 @@ void main() {
     const vec3 e = sample_light(k, l, distance);
     const float nl = dot(n, l);
     if (nl <= 0.0 || max(e.r, max(e.g, e.b)) <= 0.0) continue;
-    const vec3 matte = translucent ? vec3(0.0) : reflectance.rgb / kPi;
-    const vec3 more = (matte + mirrored_share(n, l, v)) * e * nl;
+    const vec3 more = (matte.rgb / kPi + mirrored_share(n, l, v)) * e * nl;
     if (all(lessThanEqual(more, kUnseen * sum))) continue;
     sum += more * lit(k, n, distance);
   }

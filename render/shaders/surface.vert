@@ -13,14 +13,14 @@ layout(location = 2) out vec3 fluence;
 layout(location = 3) out vec3 flux;
 layout(location = 4) out vec2 sky_mark;
 layout(location = 5) flat out vec4 optics;
-layout(location = 6) flat out vec4 reflectance;
+layout(location = 6) out vec4 matte;  // w: radiance of marks
 
 void main() {
   const Vertex v = vertices[gl_VertexIndex];
   const Glow g = glow[gl_VertexIndex];
   const Object object = objects[int(v.place.w)];
   optics = object.optics;
-  reflectance = object.reflectance;
+  matte = vec4(v.matte.rgb, object.marks.w);
   place = v.place.xyz;
   normal = v.normal.xyz;
   fluence = vec3(g.fluence[0], g.fluence[1], g.fluence[2]);

@@ -85,6 +85,17 @@ TEST(SceneConfig, ReadsAShellOnlyWhereABlockIsWrappedAround) {
               HasSubstr("unknown key \"shell_depth\""));
 }
 
+TEST(SceneConfig, ReadsAMeasuredSurfaceWithItsMaterial) {
+  const std::string_view coefficients =
+      "absorption = [0.01, 0.01, 0.01]\nreduced_scattering = [1, 1, 1]";
+  const auto scene =
+      parsed(scene_with(coefficients, "file = \"wax.vdb\"\nsurface_reflectance = \"wax.exr\""));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->objects[0].material.surface_reflectance, "/scenes/wax.exr");
+  EXPECT_THAT(refusal("absorption = [0.01, 0.01, 0.01]", "surface_reflectance = \"wax.exr\""),
+              HasSubstr("unknown key \"surface_reflectance\""));
+}
+
 TEST(SceneConfig, RefusesWhatItCannotMeanWithPlaceAndRemedy) {
   EXPECT_THAT(refusal("size =", "sise ="),
               AllOf(HasSubstr("scene.toml:10:1: unknown key \"sise\" in [objects 1]"),

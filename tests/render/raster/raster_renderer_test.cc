@@ -5,6 +5,10 @@
 #include <cmath>
 #include <mutex>
 
+#include "base/io/surface_io.h"
+#include "base/io/volume_io.h"
+#include "tests/support/temporary_directory.h"
+
 namespace opaline::render {
 namespace {
 
@@ -120,6 +124,42 @@ TEST_F(Raster, ShowsSpotsAndPointLightsAsRaysDo) {
   make(scene);
   EXPECT_THAT(raster_->left_out(), IsEmpty());
   EXPECT_LT(share_that_differs(by_raster(), by_host()), 0.015);
+}
+
+TEST_F(Raster, ShowsAMeasuredSurfaceAsRaysDo) {
+  const testing::TemporaryDirectory directory;
+  Material material;
+  SurfaceReflectance surface;
+  material.block = surface.block = {6, 6, 2, 1.0, 1.0, 1.0};
+  for (auto& channel : material.channels) {
+    channel.absorption.assign(material.block.cell_count(), 0.01);
+    channel.reduced_scattering.assign(material.block.cell_count(), 1.0);
+  }
+  surface.reflectance = surface.variance = Image<float>(6, 6, 3);
+  surface.mask = Image<std::uint8_t>(6, 6, 1);
+  for (int x = 0; x < 6; ++x) {
+    for (int y = 0; y < 6; ++y) {
+      surface.mask.at(x, y) = 1;
+      surface.reflectance.at(x, y, 0) = 0.02F * static_cast<float>(x);
+      surface.reflectance.at(x, y, 1) = 0.02F * static_cast<float>(y);
+    }
+  }
+  Scene scene = ring_on_floor();
+  scene.environment = {.radiance = {0.2, 0.2, 0.2}, .rays = 0};
+  for (ObjectOptions& object : scene.objects) object.surface.specular = SpecularModel::kNone;
+  TranslucentOptions& made_of = scene.objects[0].material;
+  made_of.file = directory.path() / "material.vdb";
+  made_of.placement = Placement::kShell;
+  ASSERT_TRUE(write_material(system_files(), made_of.file, material, "test"));
+  make(scene);
+  const auto without = by_raster();
+  scene.objects[0].material.surface_reflectance = directory.path() / "surface.exr";
+  ASSERT_TRUE(
+      write_surface(system_files(), scene.objects[0].material.surface_reflectance, surface));
+  make(scene);
+  const auto with = by_raster();
+  EXPECT_GT(share_that_differs(with, without), 0.05);
+  EXPECT_LT(share_that_differs(with, by_host()), 0.01);
 }
 
 // From below the floor hides half of the ring and shows its back, which is as bright as its front.
