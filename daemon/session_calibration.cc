@@ -10,6 +10,7 @@
 #include "calibration/procedure.h"
 #include "calibration/sample_finder.h"
 #include "calibration/store.h"
+#include "daemon/session_camera.h"
 
 namespace opaline::daemon {
 namespace {
@@ -192,6 +193,10 @@ Result<capture::StationCalibration> session_calibration(const SessionDirectory& 
   if (*placement) {
     calibration->camera.model.camera_from_sample = (*placement)->camera_from_sample;
     calibration->camera.place_covariance = (*placement)->covariance;
+  }
+  if (!(calibration->camera.model == rig.calibration.camera.model)) {
+    if (auto kept = keep_camera(session, files, calibration->camera.model); !kept)
+      return kept.error();
   }
   return calibration;
 }

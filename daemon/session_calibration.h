@@ -20,6 +20,8 @@ namespace opaline::daemon {
 /// Where the rig file has a holder, and calibrations are used at all, the camera's place before the sample, with its covariance, is by that
 /// (calibration::find_sample), measured at the same moment and kept in SESSION/calibration/placement.json.
 ///
+/// Camera lens and place that come out of it are kept for those who draw (session_camera.h).
+///
 /// Facts: calibration.used {version, created, message}, calibration.warning {message} for each doubt, placement.measured {corners,
 /// rms_px, deviation_mm, from_rig_file_mm, message}.
 /// Errors: kInvalidArgument, with the remedy, for a calibration that the station contradicts; and what devices and disk return.

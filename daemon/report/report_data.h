@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/camera_model.h"
 #include "base/dataset.h"
 #include "base/material.h"
 #include "config/session_config.h"
@@ -37,6 +38,7 @@ struct ReportData {
   std::string session_id;
   std::string generator;  ///< "opaline-preview 0.1.0"
   config::SessionConfig config;
+  CameraModel camera;  ///< that the pictures were taken with, as measured
   Dataset dataset;
   Material material;
   std::optional<Material> truth;  ///< of a simulated sample

@@ -27,6 +27,7 @@
 #include "daemon/report/results.h"
 #include "daemon/report/step_progress.h"
 #include "daemon/report/surface_view.h"
+#include "daemon/session_camera.h"
 #include "reconstruct/host/host_solver.h"
 #include "render/renderer.h"
 #include "render/translucency.h"
@@ -44,6 +45,8 @@ constexpr std::size_t kLightsAtATime = 8;  // a batch for the solver; between tw
 Result<ReportData> read_session(const SessionDirectory& session) {
   auto config = config::load_resolved(session);
   if (!config) return config.error();
+  const auto camera = session_camera(session, config->rig.calibration.camera.model);
+  if (!camera) return camera.error();
   auto dataset = read_dataset(session.path());
   if (!dataset) return dataset.error();
   auto material = read_material(session.material());
@@ -57,6 +60,7 @@ Result<ReportData> read_session(const SessionDirectory& session) {
   data.session_id = session.id();
   data.generator = fmt::format("opaline-preview {}", version());
   data.config = *std::move(config);
+  data.camera = *camera;
   data.dataset = *std::move(dataset);
   data.material = *std::move(material);
   data.reconstruction = nlohmann::json::parse(*text, nullptr, false);
@@ -146,12 +150,8 @@ Result<void> SessionReport::light_the_material() {
   while (fields_.size() < all.size()) {
     const auto batch =
         all.subspan(fields_.size(), std::min(kLightsAtATime, all.size() - fields_.size()));
-    auto fields =
-        render::illuminate(data_.material,
-                           batch,
-                           translucency(data_, data_.config.rig.calibration.camera.model.centre()),
-                           *solver_,
-                           job_.stop);
+    auto fields = render::illuminate(
+        data_.material, batch, translucency(data_, data_.camera.centre()), *solver_, job_.stop);
     if (!fields) return fields.error().in("lighting the material");
     std::ranges::move(*fields, std::back_inserter(fields_));
     progress.done(static_cast<double>(fields_.size()) / static_cast<double>(all.size()));
@@ -193,13 +193,8 @@ Result<void> SessionReport::compare(render::Renderer& renderer, std::size_t inde
   data_.fits.push_back(fit_on_surface(
       data_.dataset, light, fields_[index], data_.config.reconstruction.model_error));
   if (!light.held_out) return ok();
-  auto relit = relight(renderer,
-                       fields_[index],
-                       data_.config.rig.calibration.camera.model,
-                       data_.dataset,
-                       light,
-                       *hdr,
-                       job_.stop);
+  auto relit =
+      relight(renderer, fields_[index], data_.camera, data_.dataset, light, *hdr, job_.stop);
   if (!relit) return relit.error();
   if (!relit->is_empty()) data_.lights.push_back(*std::move(relit));
   return ok();
@@ -217,7 +212,7 @@ Result<void> SessionReport::look_at_surface(render::Renderer& renderer) {
                            data_,
                            *std::move(surface),
                            *std::move(captured),
-                           translucency(data_, data_.config.rig.calibration.camera.model.centre()),
+                           translucency(data_, data_.camera.centre()),
                            *solver_,
                            job_.stop);
   if (!view) return view.error().in("uniform light");

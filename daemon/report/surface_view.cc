@@ -64,7 +64,7 @@ Result<SurfaceView> surface_view(render::Renderer& renderer,
                                  const render::TranslucencyOptions& options,
                                  reconstruct::diffusion::FluenceSolver& solver,
                                  std::stop_token stop) {
-  const CameraModel& camera = data.config.rig.calibration.camera.model;
+  const CameraModel& camera = data.camera;
   const Image<float>& irradiance = data.dataset.uniform->irradiance;
   const render::Light whole{data.dataset.lit_face, irradiance};
   auto fields = render::illuminate(data.material, std::span(&whole, 1), options, solver, stop);

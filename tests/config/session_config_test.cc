@@ -53,6 +53,8 @@ TEST_F(SessionConfigTest, AcceptsEveryFileThatComesWithTheProgram) {
                            "sim_holder.toml",
                            "sim-rig-holder.toml",
                            "sim-rig-holder-boards.toml",
+                           "sim_holder_believed.toml",
+                           "sim-rig-holder-believed.toml",
                            "led_blob.toml",
                            "sim-rig-blob.toml",
                            "session.example.toml",

@@ -13,6 +13,7 @@
 #include "base/io/dataset_io.h"
 #include "base/session_directory.h"
 #include "config/session_config.h"
+#include "daemon/session_camera.h"
 #include "sim/optics.h"
 #include "tests/support/named_directory.h"
 #include "tests/support/process.h"
@@ -146,6 +147,16 @@ TEST_F(SessionPlacement, TheHolderTellsWhichPixelSeesWhichCellWhateverTheRigFile
   EXPECT_THAT(messages_of(placed), HasSubstr("placement.measured: the sample's place by "));
   EXPECT_TRUE(fs::exists(placed.path() / "calibration" / "placement.json"));
   EXPECT_FALSE(fs::exists(believed.path() / "calibration" / "placement.json"));
+  // Whoever draws what the camera saw draws it from there, too. A tenth of a pixel is the for a camera.
+  const CameraModel camera = session_camera(placed, {}).value();
+  CameraModel should = sim::demo_camera_model();
+  should.width = should.height = 400;
+  should.cx = should.cy = 200.0;
+  for (const Vec3 corner : {Vec3{0, 0, 6}, Vec3{24, 0, 6}, Vec3{0, 24, 6}, Vec3{24, 24, 6}}) {
+    EXPECT_NEAR(camera.project(corner).x, should.project(corner).x, 0.1);
+    EXPECT_NEAR(camera.project(corner).y, should.project(corner).y, 0.1);
+  }
+  EXPECT_EQ(session_camera(truth, camera).value(), camera);  // none of its own
   EXPECT_GT(apart(believed, truth), 0.05);
   EXPECT_LT(apart(placed, truth), 0.005);
   RecordProperty("believed", fmt::format("{}", apart(believed, truth)));
