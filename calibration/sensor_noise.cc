@@ -15,8 +15,11 @@ namespace {
 constexpr std::size_t kBins = 32;
 constexpr double kBrightest = 0.85;   // of the code range
 constexpr std::size_t kFewest = 100;  // of a bin
-constexpr double kOutlying = 5.0;     // standard deviations
-constexpr double kHot = 8.0;          // standard deviations
+constexpr double kDarkDeviations = 4.0;
+constexpr double kLeastDark =
+    4.0;  // codes: in narrower bins of whole codes the mean tells the difference
+constexpr double kOutlying = 5.0;  // standard deviations
+constexpr double kHot = 8.0;       // standard deviations
 constexpr double kMadToSigma = 1.4826;
 constexpr double kQuantisation = 1.0 / 12.0;
 constexpr double kSlopeOver = 1.0 / 64;
@@ -48,19 +51,40 @@ struct Level {
   double count = 0.0;
 };
 
-// Bins of one pair: those of two exposures would hold two noises, and the darker one would take the brighter one for outlying.
-std::vector<Bin> sorted_by_light(const FramePair& pair, CodeRange range, int channel) {
-  std::vector<Bin> bins(kBins);
-  const double width = kBrightest * (range.clipping - range.black) / (kBins - 0.5);
+double at_middle(const FramePair& pair, std::size_t sample, double black) {
+  return 0.5 * (pair.first->samples()[sample] + pair.second->samples()[sample]) - black;
+}
+
+// Up to four deviations of a pair's mean in the dark.
+double end_of_dark(const FramePair& pair, CodeRange range, int channel) {
+  std::vector<double> differences;
+  const double dark = kBrightest * (range.clipping - range.black) / (2.0 * kBins);
   for (std::size_t i = 0; i < pair.first->pixel_count(); ++i) {
     const std::size_t sample = i * pair.first->channels() + channel;
-    const double a = pair.first->samples()[sample];
-    const double b = pair.second->samples()[sample];
-    const double mean = 0.5 * (a + b) - range.black;
-    const auto bin = static_cast<std::ptrdiff_t>(std::floor(mean / width + 0.5));
-    if (bin < 0 || bin >= static_cast<std::ptrdiff_t>(kBins)) continue;
-    bins[static_cast<std::size_t>(bin)].means.push_back(mean);
-    bins[static_cast<std::size_t>(bin)].differences.push_back(a - b);
+    if (at_middle(pair, sample, range.black) >= dark) continue;
+    differences.push_back(1.0 * pair.first->samples()[sample] - pair.second->samples()[sample]);
+  }
+  if (differences.size() < kFewest) return kLeastDark;
+  return std::max(kLeastDark,
+                  kDarkDeviations * 0.5 * deviation_about(median_of(differences), differences));
+}
+
+// Bins of one pair: those of two exposures would hold two noises, and the darker one would take the brighter one for outlying. So would
+// wide bins near black of a picture that is mostly dark, wherefore bins widen with the light as its noise does.
+std::vector<Bin> sorted_by_light(const FramePair& pair, CodeRange range, int channel) {
+  std::vector<Bin> bins(kBins);
+  const double dark = end_of_dark(pair, range, channel);
+  const double most = kBrightest * (range.clipping - range.black);
+  for (std::size_t i = 0; i < pair.first->pixel_count(); ++i) {
+    const std::size_t sample = i * pair.first->channels() + channel;
+    const double mean = at_middle(pair, sample, range.black);
+    if (mean < -most / (2.0 * kBins) || mean >= most) continue;
+    const double share = std::max(0.0, mean - dark) / (most - dark);
+    const auto bin =
+        mean < dark ? std::size_t{0} : 1 + static_cast<std::size_t>((kBins - 1) * std::sqrt(share));
+    bins[std::min(bin, kBins - 1)].means.push_back(mean);
+    bins[std::min(bin, kBins - 1)].differences.push_back(1.0 * pair.first->samples()[sample] -
+                                                         pair.second->samples()[sample]);
   }
   return bins;
 }

@@ -38,7 +38,7 @@ struct PhotonTransfer {
 ///
 ///   v = m / K + (r / K)^2 + 1/12                                     codes^2
 ///
-/// fitted over 32 bins of m of each pair, each weighing by n / (2 v^2), up to 85 % of the code range. The difference is free of fixed patterns, and as
+/// fitted over 32 bins of m of each pair, the first of what is dark, the others as wide as sqrt(m) has them, each weighing by n / (2 v^2), up to 85 % of the code range. The difference is free of fixed patterns, and as
 /// sum and difference of two Poisson counts are uncorrelated, sorting pixels by the sum selects nothing. Of each bin the
 /// differences beyond five standard deviations (from the median) are left out. Through a response s(f) of the fraction f of
 /// the code range, m is the range times s, and (v - 1/12) is multiplied by (ds/df)^2, the slope over a 32nd of the range.

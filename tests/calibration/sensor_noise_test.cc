@@ -84,6 +84,32 @@ TEST(PhotonTransfer, IsNotMisledByHotPixels) {
   EXPECT_NEAR(found->read_noise_electrons, 10.0, 0.05 * 10.0);
 }
 
+// A board before a black room: what little is lit next to black must not lose its noise to what is not. 2 % as for hot pixels.
+TEST(PhotonTransfer, IsNotMisledByAPictureThatIsMostlyDark) {
+  const sim::CameraOptics o = optics(2.5, 3.0);
+  Image<float> light(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double share = std::pow(std::max(0.0, (x - 120.0) / 40.0), 3);
+      for (int c = 0; c < 3; ++c) light.at(x, y, c) = static_cast<float>(8000.0e-9 * share);
+    }
+  }
+  const sim::Sensor sensor(o, 5);
+  std::vector<Image<std::uint16_t>> frames;
+  for (std::uint64_t key = 0; key < 24; ++key) {
+    const double scale = std::pow(0.5, static_cast<double>(key / 6));
+    Image<float> scaled = light;
+    for (float& v : scaled.samples()) v *= static_cast<float>(scale);
+    frames.push_back(sensor.read(scaled, 0.1, key));
+  }
+  std::vector<FramePair> pairs;
+  for (std::size_t i = 0; i < frames.size(); i += 2) pairs.push_back({&frames[i], &frames[i + 1]});
+  const auto found = photon_transfer(pairs, kRange, 1);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_NEAR(found->electrons_per_code, 2.5, 0.02 * 2.5);
+  EXPECT_NEAR(found->read_noise_electrons, 3.0, 0.05 * 3.0);
+}
+
 TEST(PhotonTransfer, RefusesPicturesWithoutNoise) {
   const Image<std::uint16_t> dim(kWidth, kHeight, 3, 100);
   const Image<std::uint16_t> middle(kWidth, kHeight, 3, 900);
