@@ -96,7 +96,7 @@ Result<SphereMaps> find_maps(const SphereSession& session,
   const auto lower = BallTable::of_index(std::max(1.3, options.ior - options.ior_deviation));
   const auto higher = BallTable::of_index(std::min(1.5, options.ior + options.ior_deviation));
   if (!lower || !higher) return !lower ? lower.error() : higher.error();
-  reconstruct::MapOptions how = map_options(options, session.record.lights.size());
+  reconstruct::MapOptions how = map_options(options, shining_lamps(session.record));
   if (options.ior_deviation > 0.0) {
     how.lower_index = &*lower;
     how.higher_index = &*higher;
@@ -215,7 +215,7 @@ nlohmann::ordered_json maps_summary(const SphereMaps& maps,
   }
   return {{"kind", "led_sphere"},
           {"channels", channels},
-          {"lamps", session.record.lights.size()},
+          {"lamps", shining_lamps(session.record)},
           {"drift", session.record.drift},
           {"pixel_mm", session.record.pixel_mm},
           {"ior", options.ior},

@@ -28,6 +28,26 @@ constexpr std::array<std::array<std::uint8_t, 3>, kReasons> kReasonColors{{{255,
                                                                            {120, 200, 90},
                                                                            {220, 200, 70}}};
 
+constexpr std::array<std::array<double, 3>, 8> kViridis{{{68, 1, 84},
+                                                         {70, 50, 126},
+                                                         {54, 92, 141},
+                                                         {39, 127, 142},
+                                                         {31, 161, 135},
+                                                         {74, 193, 109},
+                                                         {160, 218, 57},
+                                                         {253, 231, 37}}};
+
+std::array<std::uint8_t, 3> viridis(double share) {
+  const double place = std::clamp(share, 0.0, 1.0) * (kViridis.size() - 1.0);
+  const std::size_t below = std::min(static_cast<std::size_t>(place), kViridis.size() - 2);
+  const double part = place - static_cast<double>(below);
+  std::array<std::uint8_t, 3> color{};
+  for (std::size_t k = 0; k < 3; ++k)
+    color[k] = static_cast<std::uint8_t>(
+        std::lround((1.0 - part) * kViridis[below][k] + part * kViridis[below + 1][k]));
+  return color;
+}
+
 struct Span {
   double low = 0.0;
   double high = 1.0;
@@ -109,6 +129,25 @@ MapPlot map_plot(const SphereMaps& maps, double pixel_mm, const MapView& view) {
     plot.panels.push_back({kChannelNames[c], std::move(panel), pixel, pixel, "mm", "mm"});
   }
   return plot;
+}
+
+MapPicture map_picture(const SphereMaps& maps, const MapView& view) {
+  const Span span = span_of(maps, view);
+  const int width = maps.channels[0].width;
+  const int height = maps.channels[0].height;
+  MapPicture picture{Image<std::uint8_t>(3 * width, height, 3), span.low, span.high};
+  for (int c = 0; c < 3; ++c) {
+    const ScatteringMaps& m = maps.channels[static_cast<std::size_t>(c)];
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const std::size_t at = static_cast<std::size_t>(y) * width + x;
+        if (m.left_out[at] != LeftOut::kFound) continue;
+        const auto color = viridis(((m.*view.values)[at] - span.low) / (span.high - span.low));
+        for (int k = 0; k < 3; ++k)
+          picture.pixels.at(c * width + x, y, k) = color[static_cast<std::size_t>(k)];
+      }
+  }
+  return picture;
 }
 
 CurvePlot diffusion_histogram(const SphereMaps& maps) {

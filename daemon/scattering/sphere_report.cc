@@ -72,6 +72,7 @@ class SphereReport {
   nlohmann::json reconstruction_;
   std::optional<SphereTruth> truth_;
   std::vector<std::pair<std::string, double>> dipole_errors_;
+  nlohmann::ordered_json scales_;  // of the maps' pictures, by name
   const SystemClock clock_;
   std::vector<std::pair<std::string, std::vector<std::byte>>> pngs_;
   std::string body_;
@@ -102,6 +103,11 @@ Result<void> SphereReport::write_views() {
     if (auto written = write_png("specular", tone_mapped(*maps_.specular, bright)); !written)
       return written;
   }
+  for (const MapView& view : kMapViews) {
+    MapPicture picture = map_picture(maps_, view);
+    scales_[view.name] = {{"lowest", picture.lowest}, {"highest", picture.highest}};
+    if (auto written = write_png(view.name, std::move(picture.pixels)); !written) return written;
+  }
   return write_png("left_out", reason_picture(maps_, session_.measured));
 }
 
@@ -126,7 +132,8 @@ Result<void> SphereReport::add_maps() {
   body_ += "<section id=\"maps\">\n<h2>Scattering parameters of every pixel</h2>\n";
   body_ += html::paragraph(
       "White where a pixel has no answer; why, see below. maps.exr has every value with its unit, "
-      "absorption and reduced scattering too.");
+      "absorption and reduced scattering too; preview/ has these as PNG, pixel for pixel, "
+      "results.json their scales.");
   double done = 0.0;
   for (const MapView& view : kMapViews) {
     const auto svg = draw(map_plot(maps_, session_.record.pixel_mm, view), view.name, job_.stop);
@@ -185,7 +192,7 @@ void SphereReport::add_header(const SessionFacts& facts) {
       html::escaped(config_.sample_name),
       html::escaped(job_.session.id()),
       html::escaped(config_.rig.station),
-      session_.record.lights.size() - (config_.rig.light_stage.has_beam() ? 1 : 0),
+      shining_lamps(session_.record),
       html::escaped(facts.begun.substr(0, 16)));
   for (const auto& [id, title] : {std::pair{"pictures", "Pictures"},
                                   {"maps", "Maps"},
@@ -278,10 +285,11 @@ Result<void> SphereReport::add_dipole() {
         !written)
       return written;
     add_picture(name,
-                fmt::format("{}: {:.1f} % apart (relative RMS), {:.1f} % brighter in total",
+                fmt::format("{}: {:.1f} % apart (relative RMS), {:.1f} % {} in total",
                             view.name,
                             100.0 * view.error,
-                            100.0 * (view.scale - 1.0)));
+                            100.0 * std::abs(view.scale - 1.0),
+                            view.scale < 1.0 ? "darker" : "brighter"));
     dipole_errors_.emplace_back(view.name, view.error);
   }
   return add_turned();
@@ -292,6 +300,7 @@ nlohmann::ordered_json SphereReport::results(const SessionFacts& facts) const {
   json["session"] = job_.session.id();
   json["seconds"] = facts.stage_seconds;
   json["retaken"] = facts.regions_retaken;
+  json["pictures"] = scales_;
   for (const auto& [name, error] : dipole_errors_) json["dipole_error"][name] = error;
   if (!truth_) return json;
   auto balls = nlohmann::ordered_json::array();

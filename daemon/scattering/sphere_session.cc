@@ -97,6 +97,11 @@ std::vector<std::string> needed_pictures(bool split) {
 
 }  // namespace
 
+std::size_t shining_lamps(const StageRecord& record) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      record.lights, [](const SphereLight& light) { return light.intensity > 0.0; }));
+}
+
 double white_radiance(const StageRecord& record) {
   return record.depolarised *
          reconstruct::surrounding_radiance(record.lights, record.find("constant")->codes);

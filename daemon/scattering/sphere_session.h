@@ -35,6 +35,9 @@ reconstruct::StagePictures channel_pictures(const SphereSession& session, int ch
 /// Parallel less cross-polarised picture under constant light, over a white surface's: the surface's reflection. None without such a picture.
 std::optional<Image<float>> specular_map(const SphereSession& session);
 
+/// How many lamps light the object: neither dead nor a beam, which is dark in every pattern.
+std::size_t shining_lamps(const StageRecord& record);
+
 /// Radiance of a white surface under the constant pattern, cross-polarised.
 double white_radiance(const StageRecord& record);
 

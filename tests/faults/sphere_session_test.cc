@@ -113,8 +113,16 @@ TEST_F(SphereSession, GoesFromAConfigurationToMapsThatHoldAgainstTheTruth) {
     EXPECT_GT(ball.at("within_two_sigma").get<double>(), 0.9);
     EXPECT_GT(ball.at("found").get<int>(), 1000);
   }
-  for (const char* file :
-       {"maps.exr", "report.html", "preview/normals.png", "preview/specular.png"})
+  EXPECT_EQ(results.at("lamps"), 60);
+  for (const auto& scale : results.at("pictures"))
+    EXPECT_LT(scale.at("lowest").get<double>(), scale.at("highest").get<double>());
+  for (const char* file : {"maps.exr",
+                           "report.html",
+                           "preview/normals.png",
+                           "preview/specular.png",
+                           "preview/diffusion.png",
+                           "preview/translucency.png",
+                           "preview/reduced_albedo.png"})
     EXPECT_TRUE(std::filesystem::exists(session_ / file)) << file;
 }
 
