@@ -65,6 +65,9 @@ TEST_F(Opalined, StopsCleanlyOnASignalAndLeavesTheJobRunning) {
   start();
   const std::string id = create();
   ASSERT_TRUE(becomes(id, "running"));
+  ASSERT_TRUE(
+      eventually(  // the job holds its session: before, only the daemon that started it knows
+          [&] { return std::filesystem::exists(sessions_ / id / "events.jsonl"); }));
 
   daemon_->kill(SIGTERM);
 

@@ -39,6 +39,6 @@ class Process {
 
 /// Looks again and again until the condition holds; false after `deadline`.
 bool eventually(const std::function<bool()>& condition,
-                std::chrono::milliseconds deadline = std::chrono::seconds(20));
+                std::chrono::milliseconds deadline = std::chrono::minutes(1));
 
 }  // namespace opaline::testing
