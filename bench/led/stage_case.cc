@@ -107,7 +107,8 @@ StagePictures StageCase::photograph(const StageShot& shot) const {
   std::vector<std::uint8_t> clipped(static_cast<std::size_t>(p.width) * p.height, 0);
   for (const capture::StageLight& pattern : *patterns) {
     StagePictures::Picture picture{{}, {}, pattern.codes};
-    const std::vector<float> clean = light(pattern.codes);
+    std::vector<float> clean = light(pattern.codes);
+    for (float& l : clean) l *= static_cast<float>(1.0 + shot.white_error);
     const double brightest = *std::ranges::max_element(clean);
     const double per_electron = brightest / (kFilled * kFullWell);
     for (std::size_t at = 0; at < clean.size(); ++at) {
@@ -158,7 +159,7 @@ reconstruct::ScatteringMaps StageCase::estimate(const StagePictures& pictures,
   options.half_windows.clear();
   for (int half = 2; half <= shot.largest_window; half *= 2) options.half_windows.push_back(half);
   options.ratio_deviation = shot.lamp_deviation / std::sqrt(0.25 * scene_.lamps);
-  options.reflectance_deviation = 0.005;
+  options.reflectance_deviation = shot.white_deviation;
   options.ior = shot.ior;
   if (shot.ior_deviation > 0.0) {
     options.lower_index = &*lower;

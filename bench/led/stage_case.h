@@ -44,6 +44,9 @@ struct StageShot {
   double ior = 1.4;    ///< believed
   double ior_deviation = 0.0;
   double lamp_deviation = 0.01;  ///< believed, of each lamp
+  double white_deviation =
+      0.005;                 ///< believed, of the white target that reflectance is measured by
+  double white_error = 0.0;  ///< relative, of that target
   int largest_window = 32;
   std::uint64_t noise_seed = 1;
 };
