@@ -87,20 +87,21 @@ class Uncertainties {
  private:
   Result<void> add_channel(std::size_t c, const std::stop_token& stop) {
     const double begun = seconds();
-    auto problem = make_channel_problem(dataset_, static_cast<int>(c), options_, Selection::kFit);
-    if (!problem) return problem.error();
+    auto made = make_channel_problem(dataset_, static_cast<int>(c), options_, Selection::kFit);
+    if (!made) return made.error();
+    ChannelProblem problem = *std::move(made);
     const ChannelCoefficients& estimate = material_.channels[c];
     if (corrects_grid(options_, dataset_.block)) {
       const auto correction =
-          grid_correction(*problem, estimate, options_.tolerance, context_.solver, stop);
+          grid_correction(problem, estimate, options_.tolerance, context_.solver, stop);
       if (!correction) return correction.error();
-      *problem = corrected(*std::move(problem), *correction);
+      problem = corrected(std::move(problem), *correction);
     }
     const auto held_out = held_out_problem(dataset_, static_cast<int>(c), options_);
     if (!held_out) return held_out.error();
     auto found = held_out->has_value()
-                     ? posterior(*problem, **held_out, context_.solver, estimate, posterior_, stop)
-                     : posterior(*problem, context_.solver, estimate, posterior_, stop);
+                     ? posterior(problem, **held_out, context_.solver, estimate, posterior_, stop)
+                     : posterior(problem, context_.solver, estimate, posterior_, stop);
     if (!found) return found.error();
     held_out_variance_ += found->held_out_variance;
     result_.channels[c] = report(*found, estimate);

@@ -147,20 +147,21 @@ Result<void> print_posterior(const std::string& name,
     const auto c = static_cast<std::size_t>(channel);
     const ChannelCoefficients& is = result.material.channels[c];
     const ChannelCoefficients& was = truth.channels[c];
-    auto problem =
+    auto made =
         reconstruct::make_channel_problem(dataset, channel, options, reconstruct::Selection::kFit);
-    if (!problem) return problem.error();
+    if (!made) return made.error();
+    reconstruct::ChannelProblem problem = *std::move(made);
     if (reconstruct::corrects_grid(options, dataset.block)) {
       const auto correction =
-          reconstruct::grid_correction(*problem, is, options.tolerance, solver, {});
+          reconstruct::grid_correction(problem, is, options.tolerance, solver, {});
       if (!correction) return correction.error();
-      *problem = reconstruct::corrected(*std::move(problem), *correction);
+      problem = reconstruct::corrected(std::move(problem), *correction);
     }
     const auto start = clock.now();
     const auto held_out = reconstruct::held_out_problem(dataset, channel, options);
     if (!held_out) return held_out.error();
     const reconstruct::PosteriorOptions posterior{.discrepancy = options.model_error};
-    const auto known = reconstruct::posterior(*problem, **held_out, solver, is, posterior, {});
+    const auto known = reconstruct::posterior(problem, **held_out, solver, is, posterior, {});
     if (!known) return known.error();
     seconds += std::chrono::duration<double>(clock.now() - start).count();
     solves = std::max(solves, known->solves);
