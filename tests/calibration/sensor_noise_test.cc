@@ -97,7 +97,8 @@ TEST(PhotonTransfer, IsNotMisledByAPictureThatIsMostlyDark) {
   const sim::Sensor sensor(o, 5);
   std::vector<Image<std::uint16_t>> frames;
   for (std::uint64_t key = 0; key < 24; ++key) {
-    const double scale = std::pow(0.5, static_cast<double>(key / 6));
+    const std::uint64_t halvings = key / 6;
+    const double scale = std::pow(0.5, static_cast<double>(halvings));
     Image<float> scaled = light;
     for (float& v : scaled.samples()) v *= static_cast<float>(scale);
     frames.push_back(sensor.read(scaled, 0.1, key));
