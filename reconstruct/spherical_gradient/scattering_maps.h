@@ -55,7 +55,7 @@ struct MapOptions {
   /// bends or changes within the larger (intersection of confidence intervals, Goldenshluger & Nemirovski 1997).
   double agree = 3.0;
   double certain =
-      0.04;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
+      0.05;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
   double sigmas = 2.0;  ///< of what is called certain in LeftOut
   double normal_certain =
       0.004;  ///< standard deviation of a normal, radians, that needs no larger window
