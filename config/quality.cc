@@ -14,6 +14,7 @@ void apply(Quality quality, SessionConfig& s) {
       s.reconstruction.max_iterations = 20;
       s.preview.samples_per_axis = 1;
       s.preview.tolerance = 1e-4;
+      s.preview.object_tetrahedra = 1.5e4;
       return;
     case Quality::kStandard:
       return;
@@ -29,6 +30,7 @@ void apply(Quality quality, SessionConfig& s) {
       s.reconstruction.stalled = 0.002;
       s.preview.samples_per_axis = 4;
       s.preview.tolerance = 1e-8;
+      s.preview.object_tetrahedra = 2e5;
       return;
   }
 }

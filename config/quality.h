@@ -17,6 +17,7 @@ namespace opaline::config {
 ///   reconstruction.max_iterations          20     150       1000
 ///   reconstruction.discrepancy, stalled    0.1, 0.01        0, 0.002
 ///   preview.samples_per_axis, tolerance    1, 1e-4 2, 1e-6  4, 1e-8
+///   preview.object_tetrahedra              15,000 60,000    200,000
 void apply(Quality quality, SessionConfig& session);
 
 }  // namespace opaline::config

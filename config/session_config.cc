@@ -35,6 +35,8 @@ constexpr std::array<std::string_view, 4> kModelNames{
 constexpr std::array<std::string_view, 3> kMethodNames{"lbfgs", "gauss_newton", "as_published"};
 constexpr std::array<std::string_view, 2> kSmoothnessNames{"h1", "tv"};
 constexpr std::array<std::string_view, 3> kPrecisionNames{"half", "single", "double"};
+constexpr std::array<std::string_view, 7> kObjectNames{
+    "none", "sphere", "torus", "genus3", "knot", "figurine", "sheet"};
 constexpr std::array<std::string_view, 4> kBackEndNames{"auto", "host", "vulkan", "reference"};
 
 void visit_sample(Fields& fields, SessionConfig& session) {
@@ -206,6 +208,13 @@ void visit_preview(Fields& fields, PreviewOptions& p) {
   fields.number({"tolerance", "of the light's solution in the material, relative residual"},
                 p.tolerance,
                 Range{.min = 0.0, .max = 0.1, .min_excluded = true});
+  const auto named = std::ranges::find(kObjectNames, std::string_view(p.object));
+  auto object = static_cast<std::size_t>(named - kObjectNames.begin());
+  fields.choice({"object", "made of the material, drawn as well"}, object, kObjectNames);
+  p.object = kObjectNames[object];
+  fields.number({"object_tetrahedra", "about so many it is cut into"},
+                p.object_tetrahedra,
+                Range::between(100, 2e7));
 }
 
 void visit_led_sphere(Fields& fields, LedSphereOptions& o) {

@@ -22,6 +22,9 @@ struct PreviewOptions {
   int samples_per_axis = 2;       ///< of each pixel: 2 takes 4 samples a pixel; 1 to 8
   double white_quantile = 0.995;  ///< of the captured picture: what is shown as white; 0.5 to 1
   double tolerance = 1e-6;        ///< of the light's solution in the material; > 0
+  /// Shape of an object of the material that is drawn, too (daemon/preview/object_scene.h): a shape's name, or "none".
+  std::string object = "torus";
+  double object_tetrahedra = 6e4;  ///< that it is cut into, about; 100 to 2e7
 };
 
 /// One word for the settings that trade time for accuracy (config/quality.h).

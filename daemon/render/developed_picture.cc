@@ -30,7 +30,9 @@ std::array<double, 4> shown(
 }
 
 template <class Sample>
-Image<Sample> displayed(const Image<float>& radiance, double white, const PictureOptions& picture) {
+Image<Sample> display_codes(const Image<float>& radiance,
+                            double white,
+                            const PictureOptions& picture) {
   constexpr double kFull = std::numeric_limits<Sample>::max();
   const double gain = std::exp2(picture.exposure) / white;
   Image<Sample> image(radiance.width(), radiance.height(), picture.transparent ? 4 : 3);
@@ -59,6 +61,12 @@ double white_of(const Image<float>& radiance, const PictureOptions& picture) {
   return white_point(light, kQuantile);
 }
 
+Image<std::uint8_t> displayed(const Image<float>& radiance,
+                              double white,
+                              const PictureOptions& picture) {
+  return display_codes<std::uint8_t>(radiance, white, picture);
+}
+
 Result<std::vector<std::byte>> developed(const Image<float>& radiance,
                                          double white,
                                          const PictureOptions& picture,
@@ -67,9 +75,9 @@ Result<std::vector<std::byte>> developed(const Image<float>& radiance,
   if (format == ImageFormat::kExr) {
     file.pixels = radiance;
   } else if (format == ImageFormat::kTiff) {
-    file.pixels = displayed<std::uint16_t>(radiance, white, picture);
+    file.pixels = display_codes<std::uint16_t>(radiance, white, picture);
   } else {
-    file.pixels = displayed<std::uint8_t>(radiance, white, picture);
+    file.pixels = displayed(radiance, white, picture);
   }
   return encode_image(file, format);
 }

@@ -22,6 +22,11 @@ Result<std::vector<std::byte>> developed(const Image<float>& radiance,
                                          const render::PictureOptions& picture,
                                          ImageFormat format);
 
+/// The pixels of such a .png.
+Image<std::uint8_t> displayed(const Image<float>& radiance,
+                              double white,
+                              const render::PictureOptions& picture);
+
 /// What is shown as white: picture.white, else the radiance that only half a per cent of the lit pixels exceeds.
 double white_of(const Image<float>& radiance, const render::PictureOptions& picture);
 

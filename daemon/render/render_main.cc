@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -23,10 +22,9 @@
 #include "daemon/render/developed_picture.h"
 #include "daemon/render/maps_picture.h"
 #include "daemon/render/render_report.h"
+#include "daemon/render/scene_view.h"
 #include "daemon/render/turntable.h"
 #include "daemon/scattering/maps_scene.h"
-#include "render/raster/raster_renderer.h"
-#include "render/scene/scene_renderer.h"
 
 namespace opaline::daemon {
 namespace {
@@ -95,25 +93,26 @@ class Session {
     for (render::ObjectOptions& object : first.objects) {
       if (arguments_.swing) object.deform = {};
     }
-    const auto renderer = SceneRenderer::create(
-        first, team, [&](std::string_view what, double share) { show(what, 0.5 * share); }, stop);
-    if (!renderer) return renderer.error().in(arguments_.scene.string());
-    if (arguments_.draw == "vulkan") {
-      render::RasterOptions options;
-      options.gpu.device.name = arguments_.device;
-      auto raster = render::RasterRenderer::create(options);
-      if (!raster) return raster.error();
-      raster_ = *std::move(raster);
-    }
+    gpu::ContextOptions gpu;
+    gpu.device.name = arguments_.device;
+    const auto view = SceneView::create(
+        first,
+        arguments_.draw == "vulkan" ? DrawBy::kVulkan : DrawBy::kHost,
+        gpu,
+        team,
+        [&](std::string_view what, double share) { show(what, 0.5 * share); },
+        stop);
+    if (!view) return view.error().in(arguments_.scene.string());
+    SceneRenderer& renderer = (*view)->renderer();
     for (const std::string& text : arguments_.materials) {
-      if (auto saved = save_material(**renderer, text); !saved) return saved;
+      if (auto saved = save_material(renderer, text); !saved) return saved;
     }
     const int pictures = std::max(1, arguments_.turntable);
     for (int k = 0; k < pictures; ++k) {
       show(fmt::format("picture {} of {}", k + 1, pictures), 0.5 + 0.5 * k / pictures);
-      if (auto drawn = picture(**renderer, k, pictures, stop); !drawn) return drawn;
+      if (auto drawn = picture(**view, k, pictures, stop); !drawn) return drawn;
     }
-    return report((*renderer)->statistics());
+    return report(renderer.statistics());
   }
 
  private:
@@ -148,25 +147,13 @@ class Session {
     return ok();
   }
 
-  Result<Image<float>> drawn(SceneRenderer& renderer,
-                             const CameraModel& camera,
-                             const std::stop_token& stop) {
-    if (!raster_) return renderer.draw(camera, stop);
-    const auto start = std::chrono::steady_clock::now();
-    if (auto taken = raster_->take(renderer); !taken) return taken.error();
-    for (const std::string& what : raster_->left_out()) renderer.leave_out(what);
-    auto picture = raster_->draw(camera, scene_.picture.samples_per_axis, stop);
-    renderer.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    return picture;
-  }
-
-  Result<void> picture(SceneRenderer& renderer, int k, int pictures, const std::stop_token& stop) {
+  Result<void> picture(SceneView& view, int k, int pictures, const std::stop_token& stop) {
     const TurnedView turn = turned(scene_, 360.0 * k / pictures);
     if (arguments_.swing) {
-      if (auto bent = swing(renderer, static_cast<double>(k) / pictures, stop); !bent) return bent;
+      const double share = static_cast<double>(k) / pictures;
+      if (auto bent = swing(view.renderer(), share, stop); !bent) return bent;
     }
-    if (auto lit = renderer.light(turn.lights, stop); !lit) return lit;
-    const auto radiance = drawn(renderer, render::camera_of(turn.camera, scene_.picture), stop);
+    const auto radiance = view.picture(turn.lights, turn.camera, stop);
     if (!radiance) return radiance.error();
     if (k == 0) white_ = white_of(*radiance, scene_.picture);
     for (const Output& output : outputs_) {
@@ -196,7 +183,6 @@ class Session {
   std::vector<Output> outputs_;
   SystemClock clock_;
   ProgressView view_{terminal_options(), clock_};
-  std::unique_ptr<render::RasterRenderer> raster_;  // none: rays draw
   double white_ = 1.0;
 };
 

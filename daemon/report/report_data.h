@@ -9,6 +9,7 @@
 #include "base/dataset.h"
 #include "base/material.h"
 #include "config/session_config.h"
+#include "daemon/preview/session_object.h"
 #include "daemon/report/error_sums.h"
 #include "daemon/report/hdr_picture.h"
 #include "daemon/report/relighting.h"
@@ -47,6 +48,7 @@ struct ReportData {
   std::vector<RelitLight> lights;      ///< the held-out ones that could be used; may be none
   std::vector<SurfaceFit> fits;        ///< all
   std::optional<SurfaceView> surface;  ///< where the session has a picture under uniform light
+  std::optional<ObjectView> object;    ///< where the session asks for one
   std::vector<DrawnPlot> plots;
   std::optional<ChannelErrors> bssrdf;
   std::string bssrdf_absent;  ///< why there is no BSSRDF error

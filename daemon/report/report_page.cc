@@ -128,6 +128,8 @@ void add_header(const ReportData& data, Page& page) {
     page.add(fmt::format("<a href=\"#{}\">{}</a>", id, title));
     if (data.surface && std::string_view(id) == "capture")
       page.add("<a href=\"#surface\">Surface</a>");
+    if (data.object && std::string_view(id) == "material")
+      page.add("<a href=\"#object\">Object</a>");
   }
   page.add("</nav></header>\n");
 }
@@ -292,6 +294,33 @@ void add_material(const ReportData& data, Page& page) {
   page.end();
 }
 
+void add_object(const ObjectView& object, Page& page) {
+  page.begin("object", "An object made of it");
+  if (!object.is_drawn()) {
+    page.add(html::warning("Not drawn: " + object.absent));
+    return page.end();
+  }
+  page.add(html::paragraph(
+      "The shape is cut from the middle of the material, mirrored beyond it, and lit "
+      "from behind and from above. preview/object.toml is its scene: \"opaline view\" opens it to "
+      "be lit, "
+      "painted into and bent."));
+  page.add_picture(object.picture, "drawn by " + object.drawn_by);
+  Rows rows;
+  for (const auto& part : object.statistics["objects"]) {
+    if (part.value("kind", "") != "translucent") continue;
+    rows.push_back({part.value("name", ""),
+                    fmt::format("{}", part.value("tetrahedra", 0L)),
+                    fmt::format("{:.3g} mm", part.value("spacing_mm", 0.0)),
+                    fmt::format("{}", part.value("iterations", 0L)),
+                    fmt::format("{:.1e}", part.value("relative_residual", 0.0))});
+  }
+  page.add(html::table({"object", "tetrahedra", "smallest edge", "iterations", "residual"}, rows));
+  for (const auto& note : object.statistics["notes"])
+    page.add(html::paragraph(note.get<std::string>()));
+  page.end();
+}
+
 void add_uncertainty(const ReportData& data, Page& page) {
   page.begin("uncertainty", "How well the material is known");
   page.add(uncertainty_section(data.reconstruction));
@@ -338,6 +367,7 @@ Result<std::string> report_page(const ReportData& data) {
   add_convergence(data, page);
   page.add(accuracy_section(data));
   add_material(data, page);
+  if (data.object) add_object(*data.object, page);
   add_uncertainty(data, page);
   page.add(html::section("assumptions", "What was assumed", html::facts(assumptions(data))));
   add_timings(data, page);

@@ -78,6 +78,11 @@ Json pictures_json(const ReportData& data) {
   return {{"white", data.white}, {"difference_scale", data.difference}};
 }
 
+Json object_json(const ObjectView& object) {
+  if (!object.is_drawn()) return {{"absent", object.absent}};
+  return object.statistics;
+}
+
 Json surface_json(const SurfaceView& view) {
   Json json{{"median_reflectance_per_sr", view.median}};
   if (view.has_truth) json["error_against_truth"] = view.error;
@@ -108,6 +113,7 @@ std::string results_json(const ReportData& data) {
   json["fit_noise_floor"] = data.fit().all().floor();
   json["capture"] = capture_json(data);
   if (data.surface) json["surface"] = surface_json(*data.surface);
+  if (data.object) json["object"] = object_json(*data.object);
   json["pictures"] = pictures_json(data);
   json["reconstruction"] = data.reconstruction;
   json["assumptions"] = assumptions_json(data);

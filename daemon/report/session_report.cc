@@ -112,6 +112,7 @@ class SessionReport {
   Result<void> look_at_surface(render::Renderer& renderer);
   Result<void> write_surface_pictures(const SurfaceView& view);
   Result<void> compare_with_transport();
+  Result<void> show_object(const gpu::ContextOptions& gpu);
   Result<void> read_facts();
   Result<void> write_pictures(const RelitLight& light);
   Result<void> write_image(const std::string& name, const ImageFile& image, ImageFormat format);
@@ -137,6 +138,7 @@ Result<void> SessionReport::run(const gpu::ContextOptions& gpu) {
   if (auto done = compare_all(**renderer); !done) return done;
   if (auto done = look_at_surface(**renderer); !done) return done;
   if (auto done = compare_with_transport(); !done) return done;
+  if (auto done = show_object(gpu); !done) return done;
   return write_report();
 }
 
@@ -260,6 +262,16 @@ Result<void> SessionReport::compare_with_transport() {
       job_.stop);
   if (!errors) return errors.error().in("BSSRDF error");
   data_.bssrdf = *errors;
+  return ok();
+}
+
+Result<void> SessionReport::show_object(const gpu::ContextOptions& gpu) {
+  if (data_.config.preview.object == "none") return ok();
+  StepProgress progress = step("object");
+  auto object = draw_object(job_, data_.config, gpu, [&](double share) { progress.done(share); });
+  if (!object) return object.error().in("an object of the material");
+  data_.object = *std::move(object);
+  progress.done(1.0);
   return ok();
 }
 

@@ -83,6 +83,8 @@ class Fabricator {
     config.rig_file = directory_ / "rig.toml";
     config.rig.sim.responses = what_.responses;
     config.sample.block = what_.truth.block;
+    config.preview.object = what_.object;
+    config.preview.object_tetrahedra = 2000;
     config.rig.sim.rig.camera.model = config.rig.calibration.camera.model = what_.camera;
     return SessionDirectory::create(
         files_, directory_, {config.name, "", "", config::to_toml(config)});

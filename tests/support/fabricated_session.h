@@ -21,6 +21,7 @@ struct Fabrication {
   bool held_out_works = true;       ///< false: no pixel of theirs can be used
   int saturated_rows = 0;           ///< of every picture, from the top
   gpu::ContextOptions gpu;          ///< that draws the pictures
+  std::string object = "none";      ///< config's preview.object
   std::filesystem::path responses;  ///< stored light transport of the truth, or empty
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -12,6 +13,9 @@
 #include "base/face_view.h"
 #include "base/io/image_io.h"
 #include "base/io/transport_io.h"
+#include "base/thread_team.h"
+#include "config/scene_config.h"
+#include "daemon/render/scene_view.h"
 #include "daemon/report/html.h"
 #include "daemon/report/step_progress.h"
 #include "daemon/report/surface_radiance.h"
@@ -289,6 +293,111 @@ TEST_F(SessionReportTest, SaysWhatWasAssumedAndSetAndHowLongItTook) {
   }
   EXPECT_THAT(timings, HasSubstr(results["versions"]["solver"].get<std::string>()));
   EXPECT_EQ(results["cells"], nlohmann::json({12, 12, 6}));
+}
+
+Image<float> read_picture(const std::filesystem::path& file) {
+  const auto bytes = read_bytes(file, 1 << 26);
+  EXPECT_TRUE(bytes) << file;
+  const auto image = bytes ? decode_image(*bytes) : Result<ImageFile>(bytes.error());
+  EXPECT_TRUE(image) << file;
+  return image ? std::get<Image<float>>(image->pixels) : Image<float>(1, 1, 4);
+}
+
+/// ||a - b|| / ||b|| of what is seen.
+double difference(const Image<float>& a, const Image<float>& b) {
+  EXPECT_EQ(a.samples().size(), b.samples().size());
+  double off = 0.0;
+  double all = 0.0;
+  for (std::size_t i = 0; i < std::min(a.samples().size(), b.samples().size()); ++i) {
+    off += std::pow(a.samples()[i] - b.samples()[i], 2);
+    all += std::pow(b.samples()[i], 2);
+  }
+  return std::sqrt(off / all);
+}
+
+TEST_F(SessionReportTest, DrawsAnObjectOfTheMaterial) {
+  what_.object = "torus";
+  const auto results = report();
+  const nlohmann::json& ring = results["object"]["objects"][1];
+  EXPECT_EQ(ring["kind"], "translucent");
+  EXPECT_GT(ring["tetrahedra"].get<int>(), 1000);
+  // A torus of 24 mm, the face's shorter side: 2 pi^2 R r^2 with R = 9 and r = 3 mm; cut into so few
+  // tetrahedra it is 10 % smaller.
+  EXPECT_NEAR(ring["volume_mm3"].get<double>(), 2 * std::pow(M_PI, 2) * 9 * 9, 160.0);
+  EXPECT_LE(ring["relative_residual"].get<double>(), 1e-5);
+  EXPECT_THAT(section("object"), HasSubstr("data:image/png;base64,"));
+  EXPECT_THAT(section("object"),
+              HasSubstr(fmt::format("<td>{}</td>", ring["tetrahedra"].get<int>())));
+  EXPECT_EQ(progress_.steps["object"].back().fraction, 1.0);
+  const auto shown = read_bytes(session() / "preview" / "object.png", 1 << 24);
+  ASSERT_TRUE(shown);
+  EXPECT_EQ(std::get<Image<std::uint8_t>>(decode_image(*shown)->pixels).width(), 640);
+}
+
+TEST_F(SessionReportTest, LightsAnObjectAsTheFoundCoefficientsSay) {
+  what_.object = "torus";
+  for (auto& channel : what_.found.channels) {
+    std::ranges::fill(channel.absorption, 0.03);
+    std::ranges::fill(channel.reduced_scattering, 1.5);
+  }
+  report();
+  // The same scene with the coefficients written out, without the session's files.
+  std::string text = read_text(session() / "preview" / "object.toml").value();
+  const std::size_t file = text.find("file = ");
+  text.replace(file,
+               text.size() - file,
+               fmt::format("absorption = [0.03, 0.03, 0.03]\nreduced_scattering = [1.5, 1.5, "
+                           "1.5]\nior = {}\n",
+                           what_.found.ior));
+  const auto scene = config::parse_scene({"written.toml", text, {}});
+  ASSERT_TRUE(scene) << scene.error().message;
+  ThreadTeam team(2);
+  const auto view = SceneView::create(*scene, DrawBy::kAuto, {}, team, [](auto, auto) {}, {});
+  ASSERT_TRUE(view) << view.error().message;
+  const auto written = (*view)->picture(scene->lights, scene->camera, {});
+  ASSERT_TRUE(written) << written.error().message;
+  const auto drawn = read_picture(session() / "preview" / "object.exr");
+  EXPECT_LT(difference(drawn, *written), 1e-4);  // the solutions' tolerance is 1e-5
+}
+
+TEST_F(SessionReportTest, DrawsTheSceneOfAnObjectAsItWasEdited) {
+  what_.object = "sphere";
+  report();
+  const auto before = read_picture(session() / "preview" / "object.exr");
+  const auto file = session() / "preview" / "object.toml";
+  const std::string edited = read_text(file).value() +
+                             "[[objects.edits]]\noperation = \"scale\"\nvalue = [1, 30, 30]\n"
+                             "reach = \"through\"\nradius = \"40 mm\"\n";
+  ASSERT_TRUE(write_whole(system_files(), file, edited));
+  const auto session = SessionDirectory::open(this->session());
+  JobContext job{*session, progress_, system_files(), {}};
+  ASSERT_TRUE(report_session(job, tests::validated()));
+  EXPECT_EQ(read_text(file).value(), edited);
+  const auto after = read_picture(this->session() / "preview" / "object.exr");
+  double red = 0.0, green = 0.0, red_before = 0.0, green_before = 0.0;
+  for (int y = 180; y < 300; ++y) {
+    for (int x = 280; x < 360; ++x) {
+      red += after.at(x, y, 0);
+      green += after.at(x, y, 1);
+      red_before += before.at(x, y, 0);
+      green_before += before.at(x, y, 1);
+    }
+  }
+  EXPECT_NEAR(red, red_before, 0.01 * red_before);  // a factor of one
+  EXPECT_LT(green, 0.7 * green_before);             // absorbs thirty times as much
+}
+
+TEST_F(SessionReportTest, SaysWhyThereIsNoPictureOfAnObject) {
+  what_.object = "torus";
+  report();
+  ASSERT_TRUE(write_whole(
+      system_files(), session() / "preview" / "object.toml", std::string_view("nonsense = 1\n")));
+  const auto session = SessionDirectory::open(this->session());
+  JobContext job{*session, progress_, system_files(), {}};
+  ASSERT_TRUE(report_session(job, tests::validated()));
+  page_ = read_text(session->report()).value();
+  EXPECT_THAT(section("object"), HasSubstr("Not drawn"));
+  EXPECT_THAT(section("object"), HasSubstr("object.toml:1:1"));
 }
 
 TEST_F(SessionReportTest, DoesWithoutHeldOutLights) {
