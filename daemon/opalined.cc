@@ -14,6 +14,7 @@
 #include "daemon/jobs/version.h"
 #include "daemon/routes/artefacts.h"
 #include "daemon/routes/events.h"
+#include "daemon/routes/objects.h"
 #include "daemon/routes/sessions.h"
 #include "daemon/routes/status.h"
 #include "daemon/routes/viewfinders.h"
@@ -105,6 +106,9 @@ Result<void> serve(Arguments& arguments) {
       executor,
       system_files());
   add_viewfinder_routes(router, viewfinders);
+  LiveObjects objects(
+      [&](const std::string& id) { return (*station)->directory(id); }, executor, system_files());
+  add_object_routes(router, objects);
   const auto server = HttpServer::listen(
       arguments.http, [&](const HttpRequest& request) { return router.handle(request); });
   if (!server) return server.error();
