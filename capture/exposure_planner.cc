@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/told_black.h"
+
 namespace opaline::capture {
 namespace {
 
@@ -54,7 +56,8 @@ ExposurePlanner::ExposurePlanner(const ExposureOptions& options,
                                  std::span<const std::chrono::nanoseconds> ladder,
                                  double most_seconds,
                                  const PlannedCells& cells,
-                                 const Image<std::uint8_t>& ignored)
+                                 const Image<std::uint8_t>& ignored,
+                                 std::span<const int> blacks)
     : camera_(camera),
       wanted_snr_(kMargin * options.planned_snr),
       dim_share_(options.dim_share),
@@ -72,7 +75,8 @@ ExposurePlanner::ExposurePlanner(const ExposureOptions& options,
   for (const auto time : ladder)
     problem_.seconds.push_back(std::chrono::duration<double>(time).count());
   problem_.taken.assign(ladder.size(), 0);
-  problem_.blacks.assign(ladder.size(), 1);
+  problem_.blacks.assign(blacks.begin(), blacks.end());
+  problem_.blacks.resize(ladder.size(), 1);
   problem_.share = options.planned_share;
   problem_.read_variance = rounding_and_read_noise(camera);
   problem_.clipping_electrons = electrons_from_code(camera, clipping_code_).signal;
@@ -92,10 +96,7 @@ void ExposurePlanner::collect(const ExposurePair& pair, bool shortest) {
         Seen& seen = seen_[sample++];
         const std::uint16_t code = pair.light->samples()[3 * pixel.place + c];
         if (code > near_full && !shortest) continue;
-        double black = signal(pair.black->samples()[3 * pixel.place + c]);
-        for (const auto* const more : pair.more_black)
-          black += signal(more->samples()[3 * pixel.place + c]);
-        black /= static_cast<double>(1 + pair.more_black.size());
+        const double black = black_of(pair, 3 * pixel.place + c, electrons_).electrons.signal;
         seen.electrons += signal(code) - scale * black;
         seen.seconds += pair.light_seconds;
         seen.leak += black;
@@ -156,7 +157,8 @@ void ExposurePlanner::add(std::size_t index,
   const bool first = std::ranges::all_of(problem_.taken, [](int n) { return n == 0; });
   collect(pair, first || index == 0);
   ++problem_.taken[index];
-  problem_.blacks[index] = static_cast<int>(1 + pair.more_black.size());
+  problem_.blacks[index] =
+      pair.told != nullptr ? pair.told->blacks : static_cast<int>(1 + pair.more_black.size());
   estimate();
 }
 

@@ -46,13 +46,15 @@ class PlannedCells {
 /// The same frames give the same choice.
 class ExposurePlanner : public ExposureChooser {
  public:
-  /// `cells` outlives us; those where `ignored` is not 0 do not count (empty: all do). At most `most_seconds` are taken.
+  /// `cells` outlives us; those where `ignored` is not 0 do not count (empty: all do). At most `most_seconds` are taken. `blacks` of each
+  /// exposure are as good as what will be subtracted (BlackFrames::worth(); empty: one each, until a frame of it is added).
   ExposurePlanner(const ExposureOptions& options,
                   const CameraCalibration& camera,
                   std::span<const std::chrono::nanoseconds> ladder,
                   double most_seconds,
                   const PlannedCells& cells,
-                  const Image<std::uint8_t>& ignored = {});
+                  const Image<std::uint8_t>& ignored = {},
+                  std::span<const int> blacks = {});
   std::optional<std::size_t> next() override;
   void add(std::size_t index, const ExposurePair& pair, const FrameLight& light) override;
 

@@ -127,7 +127,7 @@ Result<void> GradientSequence::check_space() const {
 Result<void> GradientSequence::take_black(std::stop_token stop) {
   const drivers::Pattern black = black_pattern();
   auto taken = taker_->take_black(
-      black, [this](nanoseconds e) { report(kBlackName, e); }, stop);
+      black, false, [this](nanoseconds e) { report(kBlackName, e); }, stop);
   if (!taken) return taken.error();
   if (auto saved = store_.save(kBlackName, black, taken->frames); !saved) return saved;
   use_black(std::move(taken->frames));

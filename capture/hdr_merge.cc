@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/ensure.h"
+#include "capture/told_black.h"
 
 namespace opaline::capture {
 namespace {
@@ -44,6 +45,23 @@ std::vector<Electrons> electrons_table(const CameraCalibration& camera) {
 }
 
 }  // namespace
+
+BlackSample black_of(const ExposurePair& pair,
+                     std::size_t sample,
+                     std::span<const Electrons> electrons) {
+  const auto of = [&](const Image<std::uint16_t>& frame) {
+    return electrons[std::min<std::size_t>(frame.samples()[sample], electrons.size() - 1)];
+  };
+  BlackSample black{of(*pair.black), 1.0 + static_cast<double>(pair.more_black.size())};
+  if (pair.told != nullptr) {
+    const float told = pair.told->electrons.samples()[sample];
+    if (std::isfinite(told)) return {{told, black.electrons.per_code}, 1.0 * pair.told->blacks};
+  }
+  for (const Image<std::uint16_t>* const more : pair.more_black)
+    black.electrons.signal += of(*more).signal;
+  black.electrons.signal /= black.frames;
+  return black;
+}
 
 HdrMerge::HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot)
     : camera_(camera),
@@ -91,15 +109,6 @@ double HdrMerge::variance_of(const Term& t, double rate, double leak_rate) const
              t.blacks;
 }
 
-Electrons HdrMerge::black_of(const ExposurePair& pair, int x, int y, int channel) const {
-  Electrons mean = electrons_[pair.black->at(x, y, channel)];
-  if (pair.more_black.empty()) return mean;
-  for (const Image<std::uint16_t>* const more : pair.more_black)
-    mean.signal += electrons_[more->at(x, y, channel)].signal;
-  mean.signal /= 1.0 + static_cast<double>(pair.more_black.size());
-  return mean;
-}
-
 void HdrMerge::Term::add(double other_weight, double other_seconds, double other_net) {
   const double more = frames + 1.0;
   weight += (other_weight - weight) / more;
@@ -127,8 +136,10 @@ HdrMerge::Sample HdrMerge::merge_sample(std::span<const ExposurePair> sorted,
     const double weight = shortest ? 1.0 : weight_in(*pair.light, x, y, channel);
     if (weight == 0.0) continue;
     const Electrons& light = electrons_[code];
-    const Electrons black = black_of(pair, x, y, channel);
-    const double blacks = 1.0 + static_cast<double>(pair.more_black.size());
+    const auto place =
+        static_cast<std::size_t>(y) * pair.light->width() + static_cast<std::size_t>(x);
+    const auto [black, blacks] =
+        black_of(pair, 3 * place + static_cast<std::size_t>(channel), electrons_);
     const double scale = pair.light_seconds / pair.black_seconds;
     const double net = light.signal - black.signal * scale;
     if (!shortest && all[count - 1].black == pair.black) {

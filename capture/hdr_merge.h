@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -11,6 +12,8 @@
 
 namespace opaline::capture {
 
+struct ToldBlack;
+
 /// One exposure of a light and the black pattern at the same exposure.
 struct ExposurePair {
   const Image<std::uint16_t>* light = nullptr;  ///< outlives the pair
@@ -19,7 +22,17 @@ struct ExposurePair {
   double black_seconds = 0.0;
   /// Further black frames of that exposure, which are averaged with it; they outlive the pair.
   std::span<const Image<std::uint16_t>* const> more_black = {};
+  const ToldBlack* told = nullptr;  ///< instead of all these, where it tells; outlives the pair
 };
+/// Black of one exposure, and the mean of how many frames would be known as well.
+struct BlackSample {
+  Electrons electrons;
+  double frames = 1.0;
+};
+/// `sample` counts the picture's samples, row by row; `electrons` is by code.
+BlackSample black_of(const ExposurePair& pair,
+                     std::size_t sample,
+                     std::span<const Electrons> electrons);
 
 /// Radiance as the camera saw it, 3 channels, camera pixels.
 struct HdrImage {
@@ -70,7 +83,6 @@ class HdrMerge {
                                     int x,
                                     int y,
                                     int channel) const;
-  Electrons black_of(const ExposurePair& pair, int x, int y, int channel) const;
   double variance_of(const Term& term, double rate, double leak_rate) const;
   CameraCalibration camera_;
   Image<std::uint8_t> hot_;

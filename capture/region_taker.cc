@@ -17,78 +17,11 @@ using std::chrono::nanoseconds;
 constexpr nanoseconds kReplugPatience = std::chrono::seconds(10);
 constexpr nanoseconds kReplugPause = std::chrono::milliseconds(200);
 
-constexpr double kDominates = 5.0;
-
-// Whether shot noise of what leaks is well above the noise of reading a frame.
-bool leak_dominates(const CameraCalibration& camera, const Image<std::uint16_t>& black) {
-  std::vector<std::uint16_t> codes(black.samples().begin(), black.samples().end());
-  const auto upper =
-      codes.begin() + std::ssize(codes) * 3 / 4;  // beside the sample it may be darker
-  std::ranges::nth_element(codes, upper);
-  const Electrons leak = electrons_from_code(camera, *upper);
-  const double read = camera.read_noise_electrons;
-  return leak.signal > kDominates * (read * read + leak.per_code * leak.per_code / 12.0);
-}
-
 bool can_retry(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kTimeout || code == ErrorCode::kBusy;
 }
 
 }  // namespace
-
-BlackFrames::BlackFrames(std::vector<CapturedFrame> frames,
-                         const CameraCalibration& camera,
-                         const Image<std::uint8_t>& seen)
-    : frames_(std::move(frames)), camera_(camera), footprint_(seen) {
-  std::vector<const Image<std::uint16_t>*> pictures;
-  for (const CapturedFrame& captured : frames_) pictures.push_back(&captured.frame.pixels);
-  hot_ = find_hot_pixels(camera, pictures);
-  others_.resize(frames_.size());
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
-    for (const CapturedFrame& other : frames_) {
-      if (&other != &frames_[i] && same_exposure(other.exposure_asked, frames_[i].exposure_asked))
-        others_[i].push_back(&other.frame.pixels);
-    }
-  }
-  std::ranges::transform(seen.samples(),
-                         hot_.samples(),
-                         footprint_.samples().begin(),
-                         [](std::uint8_t s, std::uint8_t h) {
-                           return static_cast<std::uint8_t>(s != 0 && h == 0 ? 1 : 0);
-                         });
-}
-
-bool BlackFrames::cover(std::span<const nanoseconds> exposures) const {
-  return std::ranges::all_of(exposures, [this](nanoseconds exposure) {
-    return std::ranges::any_of(frames_, [exposure](const CapturedFrame& black) {
-      return same_exposure(black.exposure_asked, exposure);
-    });
-  });
-}
-
-std::size_t BlackFrames::useful(std::span<const nanoseconds> exposures,
-                                const CameraCalibration& camera) const {
-  for (std::size_t i = 0; i < exposures.size(); ++i) {
-    for (const CapturedFrame& black : frames_) {
-      if (same_exposure(black.exposure_asked, exposures[i]) &&
-          leak_dominates(camera, black.frame.pixels))
-        return i + 1;
-    }
-  }
-  return exposures.size();
-}
-
-std::optional<ExposurePair> BlackFrames::pair(const CapturedFrame& light) const {
-  const auto black = std::ranges::find_if(frames_, [&](const CapturedFrame& frame) {
-    return same_exposure(frame.exposure_asked, light.exposure_asked);
-  });
-  if (black == frames_.end()) return std::nullopt;
-  return ExposurePair{&light.frame.pixels,
-                      &black->frame.pixels,
-                      exposed_seconds(camera_, seconds(light.frame.exposure)),
-                      exposed_seconds(camera_, seconds(black->frame.exposure)),
-                      others_[static_cast<std::size_t>(black - frames_.begin())]};
-}
 
 std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
                                             std::span<const double> times) {
@@ -249,13 +182,14 @@ RegionTaker::CaptureResult RegionTaker::capture(const drivers::Pattern& pattern,
 }
 
 RegionTaker::Attempt RegionTaker::attempt_black(const drivers::Pattern& black,
+                                                bool repeated,
                                                 const Watcher& watcher,
                                                 std::stop_token stop) {
   if (auto failure = show(black, stop)) return tl::unexpected(*std::move(failure));
   TakenLight taken{{}, true, 0};
   const bool planned = settings_.options.exposures.mode == ExposureMode::kPlanned;
   for (std::size_t i = 0; i < ladder_.size(); ++i) {
-    const int times = planned ? planned_blacks(ladder_[i], ladder_.size()) : 1;
+    const int times = planned && repeated ? planned_blacks(ladder_[i], ladder_.size()) : 1;
     for (int repeat = 0; repeat < times; ++repeat) {
       auto frame = capture(black, i, static_cast<std::size_t>(repeat), watcher, stop);
       if (!frame) return tl::unexpected(std::move(frame.error()));
@@ -310,10 +244,11 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
 }
 
 Result<TakenLight> RegionTaker::take_black(const drivers::Pattern& black,
+                                           bool repeated,
                                            const Watcher& watcher,
                                            std::stop_token stop) {
   return with_retries(
-      "black", [&] { return attempt_black(black, watcher, stop); }, stop);
+      "black", [&] { return attempt_black(black, repeated, watcher, stop); }, stop);
 }
 
 void RegionTaker::use_black(const BlackFrames& black) {

@@ -13,6 +13,7 @@
 #include "base/events.h"
 #include "base/image.h"
 #include "base/result.h"
+#include "capture/black_frames.h"
 #include "capture/calibration.h"
 #include "capture/capture_options.h"
 #include "capture/exposure_chooser.h"
@@ -23,40 +24,6 @@
 #include "capture/station.h"
 
 namespace opaline::capture {
-
-/// Black frames by exposure, to subtract, and what they tell of the pixels.
-class BlackFrames {
- public:
-  BlackFrames() = default;
-  BlackFrames(BlackFrames&&) = default;
-  BlackFrames& operator=(BlackFrames&&) = default;
-  ~BlackFrames() = default;
-  /// `seen` marks the pixels (1) that see the sample.
-  BlackFrames(std::vector<CapturedFrame> frames,
-              const CameraCalibration& camera,
-              const Image<std::uint8_t>& seen);
-  bool empty() const { return frames_.empty(); }
-  /// Whether there is a black of each of these exposures.
-  bool cover(std::span<const std::chrono::nanoseconds> exposures) const;
-  /// Of these exposures, how many it takes until what leaks is well above the read noise; all where it never is.
-  std::size_t useful(std::span<const std::chrono::nanoseconds> exposures,
-                     const CameraCalibration& camera) const;
-  /// Hot pixels: 1.
-  const Image<std::uint8_t>& hot() const { return hot_; }
-  /// Pixels that see the sample and are not hot: 1. Only these tell light from dark, since a hot
-  /// one saturates in a long exposure without any light.
-  const Image<std::uint8_t>& footprint() const { return footprint_; }
-  /// The pair of a frame with the blacks of its exposure, their times as exposed_seconds() has them; none when there is no such black. We outlive the pair.
-  std::optional<ExposurePair> pair(const CapturedFrame& light) const;
-
- private:
-  using Pictures = std::vector<const Image<std::uint16_t>*>;
-  std::vector<CapturedFrame> frames_;
-  CameraCalibration camera_;
-  std::vector<Pictures> others_;  ///< of each frame: those of the same exposure
-  Image<std::uint8_t> hot_;
-  Image<std::uint8_t> footprint_;
-};
 
 /// The frames of one light, and whether any shows light at all.
 struct TakenLight {
@@ -91,9 +58,10 @@ class RegionTaker {
   /// Called before each exposure, for those who watch.
   using Watcher = std::function<void(std::chrono::nanoseconds exposure)>;
 
-  /// The black pattern at every exposure of the ladder; for planned exposures planned_blacks() times, and none
-  /// longer than one in which the noise of what leaks is five times that of reading: several of these are as good.
+  /// The black pattern at every exposure of the ladder; for planned exposures none longer than one in which the noise of what leaks is
+  /// five times that of reading, for several of these are as good, and `repeated` ones planned_blacks() times.
   Result<TakenLight> take_black(const drivers::Pattern& black,
+                                bool repeated,
                                 const Watcher& watcher,
                                 std::stop_token stop);
   /// The exposures of one light that `choose` wants; none: a bracket. Not lit when even the longest exposure shows nothing,
@@ -135,6 +103,7 @@ class RegionTaker {
                         const Watcher& watcher,
                         std::stop_token stop);
   Attempt attempt_black(const drivers::Pattern& black,
+                        bool repeated,
                         const Watcher& watcher,
                         std::stop_token stop);
   Attempt attempt_light(const drivers::Pattern& pattern,

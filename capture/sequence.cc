@@ -12,6 +12,7 @@
 #include "base/io/dataset_io.h"
 #include "base/log.h"
 #include "base/seconds.h"
+#include "capture/black_taking.h"
 #include "capture/dataset_builder.h"
 #include "capture/disk_space.h"
 #include "capture/exposure_planner.h"
@@ -30,6 +31,7 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 constexpr const char* kBlackName = "black";
+constexpr const char* kWhiteName = "white";      // tells the black
 constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on average at most
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
 
@@ -72,7 +74,8 @@ class Sequence {
   Result<void> check_space() const;
   Result<RegionTaker*> taker(std::stop_token stop);
   Result<void> take_black(std::stop_token stop);
-  void use_black(std::vector<CapturedFrame> frames);
+  void use_black(std::vector<CapturedFrame> frames, std::span<const CapturedFrame> white);
+  Result<void> load_black();
   Result<void> do_light(const Light& light, std::stop_token stop);
   /// None when the light is to be taken.
   Result<std::vector<CapturedFrame>> load(const std::string& name, const drivers::Pattern& pattern);
@@ -122,9 +125,7 @@ Result<void> Sequence::prepare(std::stop_token stop) {
   }
   remove_partial_files(work_.files, work_.directory);
   if (auto noted = note_plan(); !noted) return noted;
-  auto stored = load(kBlackName, patterns_.black);
-  if (!stored) return stored.error();
-  if (!stored->empty()) use_black(*std::move(stored));
+  if (auto loaded = load_black(); !loaded) return loaded;
   const bool complete = std::ranges::all_of(
       patterns_.lights, [this](const Light& light) { return store_.has(light.name); });
   if (complete && !black_.empty()) return ok();
@@ -145,8 +146,19 @@ Result<void> Sequence::note_plan() {
   return work_.events.fact("capture.planned", {{"regions", regions}, {"held_out", held_out}});
 }
 
-void Sequence::use_black(std::vector<CapturedFrame> frames) {
-  black_ = BlackFrames(std::move(frames), task_.calibration.camera, map_.footprint());
+// Frames of white that were there and are damaged leave the black untold: both are taken again.
+Result<void> Sequence::load_black() {
+  auto black = load(kBlackName, patterns_.black);
+  if (!black) return black.error();
+  const bool told = store_.has(kWhiteName);
+  const auto white = load(kWhiteName, patterns_.white);
+  if (!white) return white.error();
+  if (!black->empty() && told != white->empty()) use_black(*std::move(black), *white);
+  return ok();
+}
+
+void Sequence::use_black(std::vector<CapturedFrame> frames, std::span<const CapturedFrame> white) {
+  black_ = BlackFrames(std::move(frames), task_.calibration.camera, map_.footprint(), white);
   merge_.emplace(task_.calibration.camera, black_.hot());
   cells_.emplace(map_, black_.footprint(), task_.options.min_coverage);
 }
@@ -189,11 +201,21 @@ Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,
 }
 
 Result<void> Sequence::take_black(std::stop_token stop) {
-  auto taken = taker_->take_black(
-      patterns_.black, [this](nanoseconds exposure) { report(kBlackName, exposure); }, stop);
+  auto taken = take_blacks(
+      *taker_,
+      patterns_,
+      {task_.options, task_.calibration.camera},
+      map_.footprint(),
+      work_.events,
+      [this](nanoseconds exposure) { report(kBlackName, exposure); },
+      std::move(stop));
   if (!taken) return taken.error();
-  if (auto saved = store_.save(kBlackName, patterns_.black, taken->frames); !saved) return saved;
-  use_black(std::move(taken->frames));
+  if (!taken->white.empty()) {
+    if (auto saved = store_.save(kWhiteName, patterns_.white, taken->white); !saved) return saved;
+  }
+  // Last: with it, both count as taken.
+  if (auto saved = store_.save(kBlackName, patterns_.black, taken->black); !saved) return saved;
+  use_black(std::move(taken->black), taken->white);
   return ok();
 }
 
@@ -256,7 +278,8 @@ std::unique_ptr<ExposureChooser> Sequence::chooser_of(const Light& light) const 
                                                ladder,
                                                seconds(taker_->whole_ladder()),
                                                *cells_,
-                                               ignored_in(light));
+                                               ignored_in(light),
+                                               black_.worth(ladder));
     case ExposureMode::kBracket:
       break;
   }

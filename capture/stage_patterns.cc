@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "base/ensure.h"
+#include "capture/cholesky.h"
 
 namespace opaline::capture {
 namespace {
@@ -32,28 +32,6 @@ double kernel(double x, int degree) {
   return sum / (4.0 * pi);
 }
 
-/// Solves a x = b by Cholesky's factors, in place; a is symmetric positive definite, row-major.
-std::vector<double> solve(std::vector<double>& a, std::vector<double> b) {
-  const std::size_t n = b.size();
-  for (std::size_t j = 0; j < n; ++j) {
-    for (std::size_t i = j; i < n; ++i) {
-      double sum = a[i * n + j];
-      for (std::size_t k = 0; k < j; ++k) sum -= a[i * n + k] * a[j * n + k];
-      a[i * n + j] = i == j ? std::sqrt(sum) : sum / a[j * n + j];
-    }
-    ENSURE(a[j * n + j] > 0.0);
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t k = 0; k < i; ++k) b[i] -= a[i * n + k] * b[k];
-    b[i] /= a[i * n + i];
-  }
-  for (std::size_t i = n; i-- > 0;) {
-    for (std::size_t k = i + 1; k < n; ++k) b[i] -= a[k * n + i] * b[k];
-    b[i] /= a[i * n + i];
-  }
-  return b;
-}
-
 std::vector<double> weights_of(std::span<const Vec3> directions, int degree) {
   const std::size_t n = directions.size();
   const double even = 4.0 * pi / static_cast<double>(n);
@@ -62,7 +40,7 @@ std::vector<double> weights_of(std::span<const Vec3> directions, int degree) {
     for (std::size_t j = 0; j < n; ++j)
       matrix[i * n + j] =
           kernel(dot(directions[i], directions[j]), degree) + (i == j ? kDamping : 0.0);
-  return solve(matrix, std::vector<double>(n, 1.0 + kDamping * even));
+  return solve_cholesky(matrix, std::vector<double>(n, 1.0 + kDamping * even));
 }
 
 std::uint8_t code_of(double level) {

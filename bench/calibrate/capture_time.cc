@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/events.h"
 #include "base/seconds.h"
+#include "capture/black_taking.h"
 #include "capture/exposure_planner.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
@@ -41,9 +42,9 @@ capture::StationCalibration believed(const sim::RigOptions& o) {
   return c;
 }
 
-double exposed(const capture::TakenLight& light) {
+double exposed(std::span<const capture::CapturedFrame> frames) {
   double sum = 0.0;
-  for (const auto& frame : light.frames) sum += seconds(frame.exposure_asked);
+  for (const auto& frame : frames) sum += seconds(frame.exposure_asked);
   return sum;
 }
 
@@ -85,11 +86,17 @@ class Bed {
                                               bed->events_);
     if (!taker) return taker.error();
     bed->taker_ = *std::move(taker);
-    auto black = bed->taker_->take_black(bed->patterns_.black, {}, {});
-    if (!black) return black.error();
-    bed->black_seconds_ = exposed(*black);
+    auto taken = capture::take_blacks(*bed->taker_,
+                                      bed->patterns_,
+                                      {bed->options_, bed->calibration_.camera},
+                                      bed->map_->footprint(),
+                                      bed->events_,
+                                      {},
+                                      {});
+    if (!taken) return taken.error();
+    bed->black_seconds_ = exposed(taken->black) + exposed(taken->white);
     bed->black_ = capture::BlackFrames(
-        std::move(black->frames), bed->calibration_.camera, bed->map_->footprint());
+        std::move(taken->black), bed->calibration_.camera, bed->map_->footprint(), taken->white);
     bed->cells_.emplace(*bed->map_, bed->black_.footprint(), bed->options_.min_coverage);
     return bed;
   }
@@ -111,7 +118,9 @@ class Bed {
                                                       calibration_.camera,
                                                       taker_->ladder(),
                                                       seconds(taker_->whole_ladder()),
-                                                      *cells_);
+                                                      *cells_,
+                                                      Image<std::uint8_t>(),
+                                                      black_.worth(taker_->ladder()));
   }
   capture::SurfaceRadiance merged(const capture::TakenLight& light) const {
     std::vector<capture::ExposurePair> pairs;
@@ -134,7 +143,7 @@ class Bed {
     for (const auto& frame : taken.frames) {
       ++problem.taken[frame.exposure_index];
       problem.blacks[frame.exposure_index] =
-          static_cast<int>(1 + black_.pair(frame)->more_black.size());
+          black_.worth(std::vector{frame.exposure_asked}).front();
     }
     return problem;
   }
@@ -235,8 +244,8 @@ Result<CaptureTime> capture_time(const sim::SceneOptions& scene) {
                "  {}: fixed {:.2f} s, planned {:.2f} s in {} frames, photon limit {:.2f} s, {:.1f} "
                "% of cells\n",
                light.name,
-               exposed(*fixed),
-               exposed(*planned),
+               exposed(fixed->frames),
+               exposed(planned->frames),
                planned->frames.size(),
                limit,
                100.0 * share);
@@ -244,9 +253,9 @@ Result<CaptureTime> capture_time(const sim::SceneOptions& scene) {
       ++time.out_of_reach;
       continue;
     }
-    time.fixed += exposed(*fixed);
+    time.fixed += exposed(fixed->frames);
     time.one_stop += one_stop;
-    time.planned += exposed(*planned);
+    time.planned += exposed(planned->frames);
     time.photon_limit += limit;
     time.share_reached = std::min(time.share_reached, share);
     if (i % kEvery == 0) again.push_back(i);

@@ -140,6 +140,34 @@ TEST_F(SequenceTest, GoesOnWithPlannedExposuresWhereItWasStopped) {
 
 // Regions of 4 x 4 mm on 8 x 8 mm: what is lit or within 1.5 mm of it is left out, by the distance of a cell's middle
 // to the rectangle.
+TEST_F(SequenceTest, TellsTheBlackOfPlannedExposuresByWhiteLightAlsoWhenItGoesOn) {
+  task_.options.exposures.mode = ExposureMode::kPlanned;
+  ASSERT_TRUE(run(dir_.path() / "whole"));
+  const auto facts = events_->facts("capture.black");
+  ASSERT_EQ(facts.size(), 1u);
+  EXPECT_TRUE(facts[0]["told_by_white"]) << facts[0].dump();
+  ASSERT_TRUE(run(dir_.path() / "stopped"));
+  fs::resize_file(dir_.path() / "stopped" / "frames" / "white" / "00-33ms.png", 100);
+  fs::remove_all(dir_.path() / "stopped" / "frames" / "region_1_0");
+  const auto summary = run(dir_.path() / "stopped");
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(events_->facts("region.damaged")[0]["message"], HasSubstr("white"));
+  EXPECT_EQ(results_of(dir_.path() / "stopped"), results_of(dir_.path() / "whole"));
+}
+
+TEST_F(SequenceTest, TakesMoreBlackFramesWhereWhiteClips) {
+  options_.projector.peak_irradiance = {1e-2, 1e-2, 1e-2};
+  task_ = support::tiny_task(options_);
+  task_.options.exposures.mode = ExposureMode::kPlanned;
+  const auto summary = run(dir_.path());
+  ASSERT_TRUE(summary) << summary.error().message;
+  const auto facts = events_->facts("capture.black");
+  ASSERT_EQ(facts.size(), 1u);
+  EXPECT_FALSE(facts[0]["told_by_white"]);
+  EXPECT_GT(facts[0]["frames"], 8);
+  EXPECT_FALSE(fs::exists(dir_.path() / "frames" / "white"));
+}
+
 TEST_F(SequenceTest, LeavesOutWhatIsLitDirectlyWhereTheLitFaceIsSeen) {
   task_.sample.lit_face = task_.sample.seen_face;
   task_.options.direct_light_margin_mm = 1.5;
