@@ -76,12 +76,13 @@ void copy_plane(const vk::raii::CommandBuffer& commands,
                 const vk::raii::Image& image,
                 vk::ImageAspectFlagBits aspect,
                 const RenderTarget::Handles& target,
-                const Buffer& to) {
+                const Buffer& to,
+                std::uint64_t first_byte = 0) {
   const auto source =
       transition(image, aspect, Layout::eAttachmentOptimal, Layout::eTransferSrcOptimal);
   commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, source));
   const vk::BufferImageCopy region(
-      0, 0, 0, {aspect, 0, 0, 1}, {0, 0, 0}, {target.width, target.height, 1});
+      first_byte, 0, 0, {aspect, 0, 0, 1}, {0, 0, 0}, {target.width, target.height, 1});
   commands.copyImageToBuffer(*image, Layout::eTransferSrcOptimal, *to.handles().buffer, region);
 }
 
@@ -171,10 +172,10 @@ void Commands::copy_color(const RenderTarget& from, Buffer& to) {
   copy_plane(handles_->commands, t.color, vk::ImageAspectFlagBits::eColor, t, to);
 }
 
-void Commands::copy_depth(const RenderTarget& from, Buffer& to) {
-  ENSURE(to.bytes() >= from.depth_bytes());
+void Commands::copy_depth(const RenderTarget& from, Buffer& to, std::uint64_t first_byte) {
+  ENSURE(to.bytes() >= first_byte + from.depth_bytes());
   const RenderTarget::Handles& t = from.handles();
-  copy_plane(handles_->commands, t.depth, vk::ImageAspectFlagBits::eDepth, t, to);
+  copy_plane(handles_->commands, t.depth, vk::ImageAspectFlagBits::eDepth, t, to, first_byte);
 }
 
 void Commands::copy(const Buffer& from, Buffer& to, std::uint64_t bytes) {

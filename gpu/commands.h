@@ -65,8 +65,8 @@ class Commands {
             bool clear);
   /// The target's colour as rows of RGBA floats, top row first. Waits for the draw.
   void copy_color(const RenderTarget& from, Buffer& to);
-  /// The depth of a target without colour as rows of floats.
-  void copy_depth(const RenderTarget& from, Buffer& to);
+  /// The depth of a target without colour as rows of floats, from a byte of the buffer on.
+  void copy_depth(const RenderTarget& from, Buffer& to, std::uint64_t first_byte = 0);
   void copy(const Buffer& from, Buffer& to, std::uint64_t bytes);
   void fill_zero(Buffer& buffer);
   /// Whatever was recorded before is done, and seen by whatever comes after and by the host when

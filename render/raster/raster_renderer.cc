@@ -51,7 +51,7 @@ struct SurfacePasses {
 };
 
 Result<SurfacePasses> make_surface_passes(gpu::Context& context) {
-  const gpu::Interface interface { 8, sizeof(Rows), 1 };
+  const gpu::Interface interface { 5, sizeof(Rows), 1 };
   auto closed = gpu::Pipeline::create_raster(context,
                                              "closed surfaces",
                                              shaders::surface_vert,
@@ -145,14 +145,8 @@ Result<void> RasterRenderer::State::begin_view(const CameraModel& camera) {
 void RasterRenderer::State::record_surfaces(const CameraModel& camera, int x0, int y0) {
   const double near_mm = kNearShare * geometry.all.radius;
   const Rows view = clip_from_scene(camera, x0, y0, tile->width, tile->height, near_mm);
-  const std::array<const gpu::Buffer*, 8> buffers{&scene.buffer(),
-                                                  &objects.buffer(),
-                                                  &vertices.buffer(),
-                                                  &glow.buffer(),
-                                                  &shadows.map(0),
-                                                  &shadows.map(1),
-                                                  &shadows.map(2),
-                                                  &shadows.map(3)};
+  const std::array<const gpu::Buffer*, 5> buffers{
+      &scene.buffer(), &objects.buffer(), &vertices.buffer(), &glow.buffer(), &shadows.maps()};
   const gpu::Arguments arguments{buffers, gpu::push_of(view)};
   const std::uint32_t closed = geometry.closed_corners;
   const auto all = static_cast<std::uint32_t>(geometry.corners.size());

@@ -17,7 +17,7 @@ Result<ShadowMaps> ShadowMaps::create(gpu::Context& context, int texels) {
   made.target_ = *std::move(target);
   auto first = gpu::Buffer::create(context, made.target_->depth_bytes(), gpu::Memory::kDevice);
   if (!first) return first.error();
-  made.maps_.push_back(*std::move(first));
+  made.maps_ = *std::move(first);
   return made;
 }
 
@@ -26,10 +26,11 @@ Result<void> ShadowMaps::record(gpu::Context& context,
                                 const gpu::Buffer& vertices,
                                 const gpu::Commands::Indexed& triangles,
                                 gpu::Commands& commands) {
-  while (maps_.size() < views.size()) {
-    auto made = gpu::Buffer::create(context, target_->depth_bytes(), gpu::Memory::kDevice);
+  const std::uint64_t bytes = views.size() * target_->depth_bytes();
+  if (maps_->bytes() < bytes) {
+    auto made = gpu::Buffer::create(context, bytes, gpu::Memory::kDevice);
     if (!made) return made.error();
-    maps_.push_back(*std::move(made));
+    maps_ = *std::move(made);
   }
   for (std::size_t m = 0; m < views.size(); ++m) {
     commands.draw(pipeline_,
@@ -37,7 +38,7 @@ Result<void> ShadowMaps::record(gpu::Context& context,
                   triangles,
                   *target_,
                   /*clear=*/true);
-    commands.copy_depth(*target_, maps_[m]);
+    commands.copy_depth(*target_, *maps_, m * target_->depth_bytes());
   }
   views_ = views;
   return ok();

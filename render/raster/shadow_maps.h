@@ -22,8 +22,8 @@ class ShadowMaps {
                       const gpu::Buffer& vertices,
                       const gpu::Commands::Indexed& triangles,
                       gpu::Commands& commands);
-  /// Any of kShadowMaps; those that were not drawn are something to bind.
-  const gpu::Buffer& map(std::size_t m) const { return maps_[std::min(m, maps_.size() - 1)]; }
+  /// One after another; without any view there is still something to bind.
+  const gpu::Buffer& maps() const { return *maps_; }
 
  private:
   ShadowMaps(gpu::Pipeline pipeline, int texels)
@@ -32,7 +32,7 @@ class ShadowMaps {
   gpu::Pipeline pipeline_;
   int texels_;
   std::optional<gpu::RenderTarget> target_;
-  std::vector<gpu::Buffer> maps_;
+  std::optional<gpu::Buffer> maps_;
   std::vector<Rows> views_;
 };
 

@@ -12,10 +12,7 @@ layout(std140, set = 0, binding = 0) uniform Scene {
   vec4 environment;  // radiance
   Light lights[96];  // kMostLights
 };
-layout(std430, set = 0, binding = 4) readonly buffer Map0 { float map0[]; };
-layout(std430, set = 0, binding = 5) readonly buffer Map1 { float map1[]; };
-layout(std430, set = 0, binding = 6) readonly buffer Map2 { float map2[]; };
-layout(std430, set = 0, binding = 7) readonly buffer Map3 { float map3[]; };
+layout(std430, set = 0, binding = 4) readonly buffer Maps { float nearest_depth[]; };  // one after another
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 fluence;
@@ -39,13 +36,6 @@ float fresnel(float cosine, float ior) {
   return 0.5 * (s * s + p * p);
 }
 
-float depth_at(int map, int texel) {
-  if (map == 0) return map0[texel];
-  if (map == 1) return map1[texel];
-  if (map == 2) return map2[texel];
-  return map3[texel];
-}
-
 // The share of a light that comes through: of the four texels around a place, bilinear.
 float lit(int k, vec3 n, float distance) {
   const int map = int(lights[k].position.w);
@@ -55,6 +45,7 @@ float lit(int k, vec3 n, float distance) {
   const float w = dot(lights[k].map[3], p);
   const vec3 at = vec3(dot(lights[k].map[0], p), dot(lights[k].map[1], p), dot(lights[k].map[2], p)) / w;
   const int side = int(lights[k].cone.w);
+  const int first = map * side * side;
   const vec2 where = (at.xy * 0.5 + 0.5) * side - 0.5;
   const ivec2 low = ivec2(floor(where));
   const vec2 share = where - low;
@@ -62,7 +53,7 @@ float lit(int k, vec3 n, float distance) {
   for (int k = 0; k < 4; ++k) {
     const ivec2 t = low + ivec2(k & 1, k >> 1);
     const bool within = all(greaterThanEqual(t, ivec2(0))) && all(lessThan(t, ivec2(side)));
-    const float nearest = within ? depth_at(map, t.y * side + t.x) : 0.0;
+    const float nearest = within ? nearest_depth[first + t.y * side + t.x] : 0.0;
     const float weight = ((k & 1) != 0 ? share.x : 1.0 - share.x) * ((k >> 1) != 0 ? share.y : 1.0 - share.y);
     if (at.z + kDepthOff >= nearest) sum += weight;
   }

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // Surfaces of all objects as seen by a pinhole camera, their vertices pulled from buffers.
-//   set 0: 0 scene (fragments), 1 objects, 2 vertices, 3 their light, 4 to 7 shadow maps (fragments)
+//   set 0: 0 scene (fragments), 1 objects, 2 vertices, 3 their light, 4 shadow maps (fragments)
 #include "raster.glsl"
 layout(std430, set = 0, binding = 1) readonly buffer Objects { Object objects[]; };
 layout(std430, set = 0, binding = 2) readonly buffer Vertices { Vertex vertices[]; };
