@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -67,23 +68,41 @@ BlobTransfer trace_place(const BlobWalk& walk,
   return transfer;
 }
 
-/// What a plane fitted to neighbours says in the middle: a weight for each.
-struct PlaneSums {
-  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+/// 1, u, v, u^2, u v, v^2
+using Quadratic = Eigen::Matrix<double, 6, 1>;
+
+/// What a quadratic surface fitted to neighbours says in the middle, as a weight for each of them.
+class QuadraticFit {
+ public:
+  explicit QuadraticFit(double reach) : scale_(1.0 / reach) {}
+  void clear() {
+    squares_.setZero();
+    count_ = 0;
+  }
   void add(double u, double v) {
-    n += 1.0;
-    x += u;
-    y += v;
-    xx += u * u;
-    xy += u * v;
-    yy += v * v;
+    const Quadratic q = terms(u, v);
+    squares_.selfadjointView<Eigen::Lower>().rankUpdate(q);
+    ++count_;
   }
-  /// a of weights a + b u + c v that give 1 to constants and 0 to slopes; none where all lie in one line.
-  std::optional<std::array<double, 3>> weights() const {
-    const double det = n * (xx * yy - xy * xy) - x * (x * yy - xy * y) + y * (x * xy - xx * y);
-    if (!(n >= 6.0 && det > 1e-6 * n * xx * yy)) return std::nullopt;
-    return std::array{(xx * yy - xy * xy) / det, (xy * y - x * yy) / det, (x * xy - xx * y) / det};
+  /// None where the neighbours do not tell the terms apart.
+  std::optional<Quadratic> weights() const {
+    if (count_ < 12) return std::nullopt;
+    const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(
+        squares_.selfadjointView<Eigen::Lower>());
+    const auto pivots = factors.vectorD();
+    if (!(pivots.minCoeff() > 1e-5 * pivots.maxCoeff())) return std::nullopt;
+    return factors.solve(Quadratic::Unit(0));
   }
+  Quadratic terms(double u, double v) const {
+    const double a = scale_ * u;
+    const double b = scale_ * v;
+    return {1.0, a, b, a * a, a * b, b * b};
+  }
+
+ private:
+  double scale_;
+  Eigen::Matrix<double, 6, 6> squares_ = Eigen::Matrix<double, 6, 6>::Zero();
+  int count_ = 0;
 };
 
 }  // namespace
@@ -169,10 +188,11 @@ std::vector<BlobTransfer> smoothed(std::span<const BlobTransfer> transfer,
       double v;
     };
     std::vector<Neighbour> near;
+    QuadraticFit fit(reach_mm);
     for (std::size_t n = static_cast<std::size_t>(thread); n < places.size();
          n += static_cast<std::size_t>(team.size())) {
       near.clear();
-      PlaneSums sums;
+      fit.clear();
       const SeenPlace& here = places[n];
       const Vec3 across = normalized(
           cross(here.normal, std::abs(here.normal.x) < 0.7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
@@ -186,14 +206,14 @@ std::vector<BlobTransfer> smoothed(std::span<const BlobTransfer> transfer,
           if (dot(to, to) > reach_mm * reach_mm || dot(here.normal, there.normal) < kLikeNormal)
             continue;
           near.push_back({found->second, dot(to, across), dot(to, along)});
-          sums.add(near.back().u, near.back().v);
+          fit.add(near.back().u, near.back().v);
         }
-      const auto weights = sums.weights();
+      const auto weights = fit.weights();
       if (!weights) continue;
       std::array<double, kTransferTerms> mean{};
       double variance = 0.0;
       for (const Neighbour& neighbour : near) {
-        const double w = (*weights)[0] + (*weights)[1] * neighbour.u + (*weights)[2] * neighbour.v;
+        const double w = weights->dot(fit.terms(neighbour.u, neighbour.v));
         const BlobTransfer& other = transfer[neighbour.place];
         for (std::size_t k = 0; k < kTransferTerms; ++k) mean[k] += w * other.terms[k];
         variance += w * w * other.variance;

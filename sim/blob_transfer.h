@@ -51,7 +51,8 @@ Result<std::vector<BlobTransfer>> trace_transfer(const Blob& blob,
                                                  const std::function<void(double)>& progress,
                                                  std::stop_token stop);
 
-/// Means over planes fitted to what lies within `reach_mm` of each place with a like normal, in its tangent plane: less noise, no bias to first order. `columns`
+/// Quadratic surfaces fitted to what lies within `reach_mm` of each place with a like normal, over its tangent plane: less noise, no bias to third order, where planes would make
+/// gradients on a ball too small by reach^2/(4 R^2). `columns`
 /// and `pixel_of` say where places lie in the picture, at most `half` pixels apart.
 std::vector<BlobTransfer> smoothed(std::span<const BlobTransfer> transfer,
                                    std::span<const SeenPlace> places,

@@ -15,7 +15,7 @@
 namespace opaline::sim {
 namespace {
 
-constexpr int kSmoothPixels = 4;
+constexpr int kSmoothPixels = 7;
 
 BlobCoefficients coefficients(double reduced_albedo, double translucency_mm) {
   return {1.0 / (3.0 * diffusion_of(reduced_albedo, translucency_mm)), reduced_albedo};

@@ -45,7 +45,7 @@ class LedTruth {
 };
 
 /// A body of any smooth shape, of one material or of two, in the middle of a sphere of lights: LedSphere's counterpart with light traced from every
-/// pixel (BlobWalk, BlobTransfer, smoothed over four pixels), so that bumps, dents, what lies behind them and what lights itself are all in it. Lamps enter by
+/// pixel (BlobWalk, BlobTransfer, smoothed over seven pixels), so that bumps, dents, what lies behind them and what lights itself are all in it. Lamps enter by
 /// their spherical harmonics to degree 8, at their mean distance.
 class LedBlob : public LightPath {
  public:
