@@ -44,7 +44,7 @@ struct LedSphereOptions {
   double ior = 1.4;                ///< of the object; 1.3 to 1.5
   double ior_deviation = 0.0;      ///< how far its index may be off; 0: it is known
   int edge_px = 3;                 ///< pixels along the object's outline that are left out: blur
-  double certain = 0.05;           ///< MapOptions::certain
+  double certain = 0.04;           ///< MapOptions::certain
   double sigmas = 2.0;             ///< MapOptions::sigmas
   int largest_window = 32;         ///< pixels on either side
   double lamp_deviation = 0.01;    ///< relative, of each lamp's intensity, independent

@@ -158,8 +158,8 @@ reconstruct::ScatteringMaps StageCase::estimate(const StagePictures& pictures,
   reconstruct::MapOptions options;
   options.half_windows.clear();
   for (int half = 2; half <= shot.largest_window; half *= 2) options.half_windows.push_back(half);
-  options.ratio_deviation = shot.lamp_deviation / std::sqrt(0.25 * scene_.lamps);
-  options.reflectance_deviation = shot.white_deviation;
+  options.shared =
+      reconstruct::shared_deviations(shot.lamp_deviation, scene_.lamps, shot.white_deviation);
   options.ior = shot.ior;
   if (shot.ior_deviation > 0.0) {
     options.lower_index = &*lower;

@@ -59,9 +59,8 @@ reconstruct::MapOptions map_options(const config::LedSphereOptions& o, std::size
   options.half_windows.push_back(o.largest_window);
   options.certain = o.certain;
   options.sigmas = o.sigmas;
-  // A quarter of the lamps makes most of a pixel's light, and what they are wrong by is theirs alone.
-  options.ratio_deviation = o.lamp_deviation / std::sqrt(0.25 * static_cast<double>(lamps));
-  options.reflectance_deviation = o.white_deviation;
+  options.shared = reconstruct::shared_deviations(
+      o.lamp_deviation, static_cast<double>(lamps), o.white_deviation);
   options.ior = o.ior;
   return options;
 }

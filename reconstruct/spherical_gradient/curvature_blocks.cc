@@ -7,6 +7,11 @@ namespace opaline::reconstruct {
 namespace {
 
 constexpr double kBlocksInReach = 8.0;
+constexpr double kFloor = 0.1;  // of the usual curvature
+constexpr double kLeast = 1e-30;
+constexpr double kLeastCount = 1e-6;  // sums over a picture have no more digits
+
+double square(double x) { return x * x; }
 
 }  // namespace
 
@@ -16,6 +21,7 @@ int CurvatureBlocks::side_for(double reach) {
 
 CurvatureBlocks::CurvatureBlocks(const ScatteringMaps& maps, int side, ThreadTeam& team)
     : side_(side),
+      floor_(std::max(kLeast, square(kFloor * quantile_of_answers(maps, maps.curvature, 0.5)))),
       width_((maps.width + side - 1) / side),
       height_((maps.height + side - 1) / side),
       sums_(static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_ + 1), Sum{}) {
@@ -47,9 +53,10 @@ CurvatureBlocks::Sum CurvatureBlocks::block(const ScatteringMaps& maps, int bx, 
       if (maps.left_out[at] == LeftOut::kConcave) sum[kConcaves] += 1.0;
       const double h = maps.curvature[at];
       if (h == 0.0) continue;
-      sum[kCount] += 1.0;
-      sum[kH] += h;
-      sum[kHH] += h * h;
+      const double weight = floor_ / (floor_ + square(maps.curvature_deviation[at]));
+      sum[kCount] += weight;
+      sum[kH] += weight * h;
+      sum[kHH] += weight * h * h;
     }
   // all pixels of a block stand in its middle
   const double x = bx;
@@ -77,7 +84,7 @@ CurvatureBlocks::Around CurvatureBlocks::around(int x, int y, double half) const
   Around around;
   around.concave = s[kConcaves];
   const double n = s[kCount];
-  if (n < 1.0) return around;
+  if (n < kLeastCount) return around;
   around.count = n;
   around.mean = s[kH] / n;
   around.variance = std::max(0.0, s[kHH] / n - around.mean * around.mean);

@@ -43,6 +43,25 @@ PixelRatio ratio_of(const GradientPictures& p, std::size_t at) {
   return r;
 }
 
+/// Of n_x and n_y, on average. What noise adds along the normal n does not turn it: with a = e_x - n_x n, the variance of n_x is
+/// sum_i a_i^2 4 var(P_i) / S + (sum_i a_i)^2 var(C) / S, C being in all three of L_i = 2 P_i - C.
+double normal_variance(const GradientPictures& p,
+                       std::size_t at,
+                       const std::array<double, 3>& normal,
+                       double square) {
+  double sum = 0.0;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    double across = 0.0;
+    for (std::size_t n = 0; n < 3; ++n) {
+      const double a = (n == axis ? 1.0 : 0.0) - normal[axis] * normal[n];
+      sum += 4.0 * a * a * p.variance[n + 1][at];
+      across += a;
+    }
+    sum += across * across * p.variance[0][at];
+  }
+  return 0.5 * sum / square;
+}
+
 }  // namespace
 
 void measure_pixel(const GradientPictures& p,
@@ -54,12 +73,13 @@ void measure_pixel(const GradientPictures& p,
   const PixelRatio r = ratio_of(p, at);
   if (!(r.square > 0.0)) return;
   const double length = std::sqrt(r.square + r.gradient_variance);
-  maps.normal_x[at] = static_cast<float>(r.gradient[0] / length);
-  maps.normal_y[at] = static_cast<float>(r.gradient[1] / length);
-  maps.normal_z[at] = static_cast<float>(r.gradient[2] / length);
+  const std::array normal{r.gradient[0] / length, r.gradient[1] / length, r.gradient[2] / length};
+  maps.normal_x[at] = static_cast<float>(normal[0]);
+  maps.normal_y[at] = static_cast<float>(normal[1]);
+  maps.normal_z[at] = static_cast<float>(normal[2]);
   values.normal_x[at] = maps.normal_x[at];
   values.normal_y[at] = maps.normal_y[at];
-  values.normal_variance[at] = static_cast<float>(r.gradient_variance / 3.0 / r.square);
+  values.normal_variance[at] = static_cast<float>(normal_variance(p, at, normal, r.square));
   values.ratio[at] = static_cast<float>(r.ratio);
   values.ratio_variance[at] = static_cast<float>(r.variance);
   values.reflectance[at] = static_cast<float>(p.radiance[0][at] / p.white);

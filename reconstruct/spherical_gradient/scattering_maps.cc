@@ -49,7 +49,8 @@ Result<void> check(const GradientPictures& p, const MapOptions& options) {
     return invalid_argument("certainty, agreement and sigmas; expected > 0");
   if (!(options.ior >= 1.0 && options.ior <= 3.0))
     return invalid_argument(fmt::format("refractive index {}; expected 1 to 3", options.ior));
-  if (!(options.ratio_deviation >= 0.0 && options.reflectance_deviation >= 0.0))
+  if (!(options.shared.ratio >= 0.0 && options.shared.reflectance >= 0.0 &&
+        options.shared.curvature >= 0.0))
     return invalid_argument("deviations; expected at least 0");
   return ok();
 }
@@ -63,6 +64,7 @@ ScatteringMaps empty_maps(int width, int height, ThreadTeam& team) {
                 &maps.normal_y,
                 &maps.normal_z,
                 &maps.curvature,
+                &maps.curvature_deviation,
                 &maps.reduced_albedo,
                 &maps.diffusion,
                 &maps.translucency,
@@ -103,6 +105,8 @@ void put_answer(const WindowValues& w,
                 ScatteringMaps& maps) {
   maps.left_out[at] = a.reason;
   maps.curvature[at] = static_cast<float>(w.curvature / pixel_mm);
+  const double deviation = std::sqrt(w.curvature_variance) / pixel_mm;
+  maps.curvature_deviation[at] = static_cast<float>(deviation);
   if (a.reason != LeftOut::kFound) return;
   const double by_tilt = curvature_by_tilt(a.shift, maps.normal_z[at]);
   const double curvature = w.curvature / pixel_mm / by_tilt;
@@ -112,6 +116,7 @@ void put_answer(const WindowValues& w,
   const double extinction = 1.0 / (3.0 * diffusion);
   const double of_tilt = kTiltDeviation * (by_tilt - 1.0);
   maps.curvature[at] = static_cast<float>(curvature);
+  maps.curvature_deviation[at] = static_cast<float>(deviation / by_tilt);
   maps.reduced_albedo[at] = static_cast<float>(a.reduced_albedo);
   maps.diffusion[at] = static_cast<float>(diffusion);
   maps.translucency[at] = static_cast<float>(translucency);

@@ -8,6 +8,7 @@
 #include "base/result.h"
 #include "base/thread_team.h"
 #include "reconstruct/spherical_gradient/ball_table.h"
+#include "reconstruct/spherical_gradient/shared_deviations.h"
 
 namespace opaline::reconstruct {
 
@@ -55,14 +56,12 @@ struct MapOptions {
   /// bends or changes within the larger (intersection of confidence intervals, Goldenshluger & Nemirovski 1997).
   double agree = 3.0;
   double certain =
-      0.05;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
+      0.04;  ///< relative deviation of curvature and of the ratio beyond a flat surface's that is certain enough
   double sigmas = 2.0;  ///< of what is called certain in LeftOut
   double normal_certain =
       0.004;  ///< standard deviation of a normal, radians, that needs no larger window
-  double ratio_deviation =
-      0.0;  ///< relative, of r, that all pixels share: how well the lamps are known
-  double reflectance_deviation = 0.0;  ///< the same of the reflectance: lamps, white, exit law
-  double ior = 1.4;                    ///< 1 to 3; of the tilt below
+  SharedDeviations shared = {};  ///< how well lamps and white are known
+  double ior = 1.4;              ///< 1 to 3; of the tilt below
   /// Tables of the lowest and the highest index that the object may have, which must outlive the call; none: the index is known. Half of what
   /// they make of ln D and alpha' counts as a deviation, and a pixel that has an answer in one only is left out.
   const BallTable* lower_index = nullptr;
@@ -74,7 +73,8 @@ struct ScatteringMaps {
   int height = 0;
   /// Of planes fitted in the smallest window that is certain enough (MapOptions::normal_certain); of each pixel by itself where none has six pixels.
   std::vector<float> normal_x, normal_y, normal_z;
-  std::vector<float> curvature;  ///< mean, 1/mm; > 0 where the object bulges
+  std::vector<float> curvature;            ///< mean, 1/mm; > 0 where the object bulges
+  std::vector<float> curvature_deviation;  ///< standard deviation by noise, 1/mm
   std::vector<float> reduced_albedo;
   std::vector<float> diffusion;           ///< D = 1/(3 sigma_t'), mm
   std::vector<float> translucency;        ///< l_d = 1/sigma_tr, mm

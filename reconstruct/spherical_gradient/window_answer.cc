@@ -49,12 +49,12 @@ bool WindowAnswers::is_same(const WindowValues& w) const {
 /// Against the table's flat one.
 double WindowAnswers::ratio_variance(const WindowValues& w) const {
   const double of_table = table_.ratio_deviation() * w.ratio;
-  const double of_lamps = options_.ratio_deviation * w.ratio;
+  const double of_lamps = options_.shared.ratio * w.ratio;
   return w.ratio_variance + of_table * of_table + of_lamps * of_lamps;
 }
 
 double WindowAnswers::reflectance_variance(const WindowValues& w) const {
-  const double shared = options_.reflectance_deviation * w.reflectance;
+  const double shared = options_.shared.reflectance * w.reflectance;
   return w.reflectance_variance + shared * shared;
 }
 
@@ -87,7 +87,8 @@ WindowAnswer WindowAnswers::answer(const WindowValues& w) {
     }
     index = spread_of(lower_, higher_);
   }
-  const double of_curvature = w.curvature_variance / (w.curvature * w.curvature);
+  const double of_curvature = w.curvature_variance / (w.curvature * w.curvature) +
+                              options_.shared.curvature * options_.shared.curvature;
   a.bent = table_.curvature_where(found_, w.unevenness / (w.curvature * w.curvature));
   a.reduced_albedo = found_.reduced_albedo;
   a.decay = std::sqrt(3.0 * (1.0 - found_.reduced_albedo));

@@ -14,7 +14,7 @@ struct PixelValues {
   int height = 0;
   std::vector<float> normal_x;
   std::vector<float> normal_y;
-  std::vector<float> normal_variance;  ///< of one component
+  std::vector<float> normal_variance;  ///< of n_x and n_y, on average
   std::vector<float> ratio;
   std::vector<float> ratio_variance;
   std::vector<float> reflectance;
