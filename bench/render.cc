@@ -93,6 +93,27 @@ void measure_accuracy() {
   }
 }
 
+/// Where the error of elements of K = 0.1 comes from: the same facets with eight times as many elements, and what those are off.
+void measure_geometry() {
+  ThreadTeam team(kThreads);
+  for (const char* name : {"torus", "figurine"}) {
+    const auto solid = bench::shape(name);
+    const double spacing = render::spacing_for(render::estimate_volume(*solid), 1.4e5);
+    const render::DiffusionOptions options{.spacing_mm = spacing, .tolerance = 1e-8};
+    render::DiffusionOptions finer = options;
+    finer.spacing_mm = 0.5 * spacing;
+    finer.interior_growth = 0.0;
+    const bench::LitMarble reference(*solid, finer, team);
+    const render::TetMesh mesh = bench::cut(*solid, 1.4e5, 0.1);
+    const bench::LitMarble coarse(mesh, *solid, options, team);
+    const bench::LitMarble same_facets(bench::cut_into_eight(mesh), *solid, options, team);
+    const std::string which(name);
+    bench::print_figure("render.error_vs_fem", which, coarse.error_against(reference), "1");
+    bench::print_figure("render.error_of_elements", which, coarse.error_against(same_facets), "1");
+    bench::print_figure("render.error_of_facets", which, same_facets.error_against(reference), "1");
+  }
+}
+
 /// One method and size, and what each tolerance makes of it.
 void measure_dial(const std::string& which,
                   const render::SignedDistance& solid,
@@ -339,6 +360,7 @@ void measure_growth() {
 
 int main(int argc, char** argv) try {
   const std::map<std::string, std::function<void()>> groups{{"accuracy", measure_accuracy},
+                                                            {"geometry", measure_geometry},
                                                             {"transport", measure_transport},
                                                             {"dials", measure_dials},
                                                             {"sphere", measure_sphere},

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <numbers>
 
 #include "base/ensure.h"
@@ -51,7 +52,58 @@ std::vector<double> vertex_areas(const TriangleMesh& mesh) {
   return areas;
 }
 
+/// The middles of a mesh's edges, as new vertices of it.
+class Middles {
+ public:
+  explicit Middles(render::TetMesh& mesh) : mesh_(mesh) {}
+  int between(int a, int b) {
+    const auto [found, is_new] = known_.try_emplace(std::minmax(a, b), 0);
+    if (is_new) {
+      found->second = static_cast<int>(mesh_.vertices.size());
+      mesh_.vertices.push_back((mesh_.vertices[a] + mesh_.vertices[b]) * 0.5);
+    }
+    return found->second;
+  }
+
+ private:
+  render::TetMesh& mesh_;
+  std::map<std::pair<int, int>, int> known_;
+};
+
 }  // namespace
+
+render::TetMesh cut_into_eight(const render::TetMesh& mesh) {
+  render::TetMesh fine{mesh.vertices, {}};
+  Middles middles(fine);
+  for (const auto& [a, b, c, d] : mesh.tets) {
+    const int ab = middles.between(a, b);
+    const int ac = middles.between(a, c);
+    const int ad = middles.between(a, d);
+    const int bc = middles.between(b, c);
+    const int bd = middles.between(b, d);
+    const int cd = middles.between(c, d);
+    fine.tets.insert(fine.tets.end(),
+                     {{a, ab, ac, ad}, {ab, b, bc, bd}, {ac, bc, c, cd}, {ad, bd, cd, d}});
+    for (const auto& [p, q] : {std::pair{ab, ac}, {ac, cd}, {cd, bd}, {bd, ab}}) {
+      const std::array<int, 4> tet{ad, bc, p, q};  // around the octahedron's axis
+      fine.tets.push_back(tet);
+      if (render::volume_of(fine, fine.tets.size() - 1) < 0.0)
+        std::swap(fine.tets.back()[0], fine.tets.back()[1]);
+    }
+  }
+  return fine;
+}
+
+LitMarble::LitMarble(render::TetMesh mesh,
+                     const render::SignedDistance& solid,
+                     const render::DiffusionOptions& options,
+                     ThreadTeam& team) {
+  auto body =
+      render::Subsurface::create(std::move(mesh), solid, marbled_optics, kIor, options, team, {});
+  ENSURE(body.has_value());
+  body_ = *std::move(body);
+  light_from(0.0);
+}
 
 LitMarble::LitMarble(const render::SignedDistance& solid,
                      const render::DiffusionOptions& options,

@@ -9,12 +9,21 @@
 
 namespace opaline::bench {
 
+/// Each tetrahedron cut into eight at the middles of its edges: another discretisation of the same shape, facets and all.
+render::TetMesh cut_into_eight(const render::TetMesh& mesh);
+
 /// A marbled solid (marbled_optics) under a directional light, solved to 1e-8: what its surface sends along its normal,
 ///
 ///   L = F_t / (4 pi eta^2) (phi + 3 J_n),   red, green, blue
 class LitMarble {
  public:
   LitMarble(const render::SignedDistance& solid,
+            const render::DiffusionOptions& options,
+            ThreadTeam& team);
+
+  /// The same in tetrahedra that are there.
+  LitMarble(render::TetMesh mesh,
+            const render::SignedDistance& solid,
             const render::DiffusionOptions& options,
             ThreadTeam& team);
 

@@ -36,6 +36,12 @@ class FiniteElements {
 
   const LaneMatrix<double>& matrix() const { return matrix_; }
   std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q) const;
+  /// The same of light that is also known in the middles of the surface's edges: linear in each quarter of a triangle. What has
+  /// a kink within a triangle, as light has where it begins to graze, or curves there, is off by a quarter.
+  std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q,
+                                  std::span<const std::array<float, 3>> of_middles) const;
+  /// The edges of the surface, by vertices of the mesh.
+  const std::vector<std::array<int, 2>>& surface_edges() const { return edges_; }
   SurfaceLight surface_light(std::span<const std::array<float, 3>> q,
                              const std::vector<Lanes<double>>& phi) const;
   /// A third of the areas of the surface triangles around each vertex; 0
@@ -50,6 +56,9 @@ class FiniteElements {
   const TetMesh* mesh_;
   reconstruct::diffusion::Boundary boundary_;
   std::vector<std::array<int, 3>> surface_;
+  std::vector<std::array<int, 2>> edges_;
+  std::vector<std::array<int, 3>>
+      edges_of_;  // of each triangle, the k-th from its corner k to the next
   std::vector<double> areas_;
   LaneMatrix<double> matrix_;
 };

@@ -45,6 +45,14 @@ class ElementsSubsurface final : public Subsurface {
     return taken;
   }
 
+  std::vector<std::array<int, 2>> edges_between() const override {
+    std::vector<int> number(mesh_.vertices.size(), -1);
+    for (std::size_t v = 0; v < used_.size(); ++v) number[used_[v]] = static_cast<int>(v);
+    std::vector<std::array<int, 2>> edges;
+    for (const auto& [a, b] : elements_->surface_edges()) edges.push_back({number[a], number[b]});
+    return edges;
+  }
+
   std::vector<Vec3> nodes() const override {
     std::vector<Vec3> centroids;
     centroids.reserve(mesh_.tets.size());
@@ -59,13 +67,18 @@ class ElementsSubsurface final : public Subsurface {
       places.push_back(
           {surface().vertices[v], normals[v], std::sqrt(elements_->surface_areas()[used_[v]])});
     }
+    for (const auto& [a, b] : edges()) {
+      places.push_back({(surface().vertices[a] + surface().vertices[b]) * 0.5,
+                        normalized(normals[a] + normals[b]),
+                        0.5 * (places[a].size + places[b].size)});
+    }
     return places;
   }
 
   SolveSummary solve(std::span<const std::array<float, 3>> q,
                      std::span<const Beam> beams,
                      std::stop_token stop) override {
-    std::vector<Lanes<double>> load = elements_->load(on_mesh(q));
+    std::vector<Lanes<double>> load = elements_->load(on_mesh(q), q.subspan(used_.size()));
     for (const Beam& beam : beams) {
       beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
         for (int k = 0; k < 4; ++k) {

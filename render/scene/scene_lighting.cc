@@ -67,15 +67,18 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const auto& places = bodies_[b].body->subsurface().places();
     const double ior = looks_[bodies_[b].object].ior;
-    body_sky_[b].resize(places.size());
+    const auto& edges = bodies_[b].body->subsurface().edges();
+    body_sky_[b].resize(places.size() - edges.size());
     const auto passed = [ior](double cosine) { return 1.0 - fresnel_reflectance(cosine, ior); };
-    for_each(places.size(), team_, stop, [&](std::size_t i) {
+    for_each(body_sky_[b].size(), team_, stop, [&](std::size_t i) {
       body_sky_[b][i] = static_cast<float>(std::numbers::pi * share(places[i], passed));
     });
     double open = 0.0;
     for (const Vec3& d : directions) open += passed(d.z);
     open *= std::numbers::pi / static_cast<double>(directions.size());
     looks_[bodies_[b].object].sky = sky_share(bodies_[b].body->drawn(), body_sky_[b], open);
+    for (const auto& [from, to] : edges)  // the sky changes slowly, and is dear to look at
+      body_sky_[b].push_back(0.5F * (body_sky_[b][from] + body_sky_[b][to]));
   }
   for (std::size_t o = 0; o < opaque_.size(); ++o) {
     if (!opaque_[o].drawn) continue;

@@ -159,6 +159,7 @@ Result<void> Subsurface::begin(const SignedDistance& solid,
   nodes_ = nodes();
   sample(material);
   if (auto taken = assemble(); !taken) return taken;
+  edges_ = edges_between();
   rest_places_ = flat_places();
   for (SurfacePlace& p : rest_places_) p.normal = smooth_normal(solid, p.place, p.normal, p.size);
   places_ = rest_places_;

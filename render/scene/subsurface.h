@@ -77,8 +77,10 @@ class Subsurface {
 
   const TriangleMesh& surface() const { return surface_; }
   const Report& report() const { return report_; }
-  /// Where q is asked for.
+  /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges().
   const std::vector<SurfacePlace>& places() const { return places_; }
+  /// Of elements the edges of surface(), by its vertices; else none.
+  const std::vector<std::array<int, 2>>& edges() const { return edges_; }
   /// What beams enter through; none on a polygrid, which has no tetrahedra to follow them in.
   const BeamDeposit* beams() const { return beams_.get(); }
   /// Solves for light q, W/mm^2 transmitted into the surface and diffuse behind it, one value a place, and for beams. Errors: kCancelled; kInternal where the
@@ -99,6 +101,7 @@ class Subsurface {
   /// Where the material is taken, at rest.
   virtual std::vector<Vec3> nodes() const = 0;
   virtual std::vector<SurfacePlace> flat_places() const = 0;
+  virtual std::vector<std::array<int, 2>> edges_between() const { return {}; }
   virtual reconstruct::diffusion::SolveSummary solve(std::span<const std::array<float, 3>> q,
                                                      std::span<const Beam> beams,
                                                      std::stop_token stop) = 0;
@@ -122,6 +125,7 @@ class Subsurface {
 
   TriangleMesh surface_;
   std::vector<SurfacePlace> places_;
+  std::vector<std::array<int, 2>> edges_;
   Report report_;
   ThreadTeam* team_ = nullptr;
   std::vector<Vec3> rest_;   // of mesh_'s vertices
