@@ -154,6 +154,26 @@ void build(ceres::Problem& problem,
   }
 }
 
+// Terms of the radial distortion that stay as they are.
+void hold_terms(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle) {
+  constexpr std::array<int, 3> kRadial{4, 5, 8};
+  for (std::size_t i = 0; i < bundle.radial_terms.size(); ++i) {
+    const auto adjusted = static_cast<std::size_t>(bundle.radial_terms[i]);
+    if (adjusted >= kRadial.size()) continue;
+    const std::vector<int> held(kRadial.begin() + static_cast<std::ptrdiff_t>(adjusted),
+                                kRadial.end());
+    problem.SetManifold(blocks.lenses[i].data(), new ceres::SubsetManifold(9, held));
+  }
+}
+
+int unknowns_of(const ceres::Problem& problem) {
+  std::vector<double*> blocks;
+  problem.GetParameterBlocks(&blocks);
+  int sum = 0;
+  for (const double* const block : blocks) sum += problem.ParameterBlockTangentSize(block);
+  return sum;
+}
+
 Result<void> check_bundle(const Bundle& bundle) {
   std::vector<int> seen(bundle.camera_from_board.size(), 0);
   for (const Sighting& s : bundle.sightings) {
@@ -242,7 +262,7 @@ Result<void> fill_deviations(ceres::Problem& problem,
     const double d = summary.distance_px[i] / sigma_of(options, bundle.sightings[i].lens);
     squares += d * d;
   }
-  const auto unknowns = static_cast<double>(problem.NumParameters());
+  const auto unknowns = static_cast<double>(unknowns_of(problem));
   const double variance =
       squares / std::max(1.0, 2.0 * static_cast<double>(bundle.sightings.size()) - unknowns);
   for (const LensBlock& lens : blocks.lenses)
@@ -259,6 +279,7 @@ Result<BundleSummary> adjust(Bundle& bundle, const BundleOptions& options, std::
   Blocks blocks = blocks_of(bundle);
   ceres::Problem problem;
   build(problem, blocks, bundle, options);
+  hold_terms(problem, blocks, bundle);
   ceres::Solver::Options how;
   how.linear_solver_type = ceres::DENSE_SCHUR;
   how.max_num_iterations = options.most_steps;

@@ -24,6 +24,8 @@ struct Bundle {
   std::vector<CameraModel> lenses;
   std::vector<Pose> camera_from_board;  ///< one a view
   std::vector<Sighting> sightings;
+  std::vector<int>
+      radial_terms;  ///< of each lens's k1 k2 k3 the first so many, 0 to 3; the others stay. Empty: all
 };
 
 struct BundleOptions {
@@ -51,7 +53,7 @@ struct BundleSummary {
 ///
 ///   sum over sightings of rho(|project(lens, lens_from_camera camera_from_board p) - pixel|^2 / sigma^2)
 ///
-/// over fx fy cx cy k1 k2 p1 p2 k3 of each lens (base/camera_model.h has the equation), each pose, and the second lens's place,
+/// over fx fy cx cy k1 k2 p1 p2 k3 of each lens (base/camera_model.h has the equation; Bundle::radial_terms), each pose, and the second lens's place,
 /// by Levenberg and Marquardt (Ceres, dense Schur complement over the poses). Standard deviations are those of least squares at
 /// the solution, from the inverse of J'J times the residuals' own variance.
 ///

@@ -1,6 +1,8 @@
 #include "calibration/lens_fit.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "calibration/kept_views.h"
 #include "calibration/zhang.h"
@@ -9,6 +11,8 @@ namespace opaline::calibration {
 namespace {
 
 constexpr int kRounds = 10;
+constexpr std::array<std::size_t, 3> kRadial{0, 1, 4};  // of the distortion: k1 k2 k3
+constexpr double kTold = 2.0;                           // standard deviations
 constexpr int kFieldsX = 8;
 constexpr int kFieldsY = 6;
 
@@ -53,7 +57,9 @@ void take_over(LensFit& fit, const Kept& kept, const std::vector<double>& rms_px
 
 void conclude(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
   take_over(fit, kept, summary.view_rms_px.front());
+  const LensDeviation free = fit.deviation;
   fit.deviation = summary.deviation.front();
+  keep_held(fit.deviation, fit.radial_terms, free);
   fit.rms_px = summary.rms_px.front();
   fit.worst_view_px = std::ranges::max(summary.view_rms_px.front());
   fit.median_view_px = median_of(summary.view_rms_px.front());
@@ -61,9 +67,27 @@ void conclude(LensFit& fit, const Kept& kept, const BundleSummary& summary) {
   fit.corners = static_cast<int>(kept.bundle.sightings.size());
 }
 
+// Whether the highest radial term cannot be told from 0: then it is 0 from now on.
+bool hold_untold_term(LensFit& fit, Bundle& bundle, const BundleSummary& summary) {
+  if (fit.radial_terms < 2) return false;
+  const auto last = static_cast<std::size_t>(fit.radial_terms - 1);
+  double& term = bundle.lenses.front().distortion[kRadial[last]];
+  const double deviation = summary.deviation.front()[4 + kRadial[last]];
+  if (std::abs(term) >= kTold * deviation) return false;
+  term = 0.0;
+  fit.deviation[4 + kRadial[last]] = deviation;
+  bundle.radial_terms = {--fit.radial_terms};
+  return true;
+}
+
 }  // namespace
 
 int LensFit::kept() const { return count_kept(views); }
+
+void keep_held(LensDeviation& deviation, int radial_terms, const LensDeviation& free) {
+  for (auto i = static_cast<std::size_t>(radial_terms); i < kRadial.size(); ++i)
+    deviation[4 + kRadial[i]] = free[4 + kRadial[i]];
+}
 
 Result<LensFit> fit_lens(int width,
                          int height,
@@ -86,7 +110,8 @@ Result<LensFit> fit_lens(int width,
     break;
   }
   Kept kept = kept_of(fit.lens, board, views, fit.views, counts);
-  const auto last = adjust(kept.bundle, {}, stop);
+  auto last = adjust(kept.bundle, {}, stop);
+  while (last && hold_untold_term(fit, kept.bundle, *last)) last = adjust(kept.bundle, {}, stop);
   if (!last) return last.error();
   conclude(fit, kept, *last);
   return fit;

@@ -36,8 +36,10 @@ struct ViewFit {
 
 struct LensFit {
   CameraModel lens;
-  LensDeviation deviation{};  ///< standard deviations of fx fy cx cy k1 k2 p1 p2 k3
-  double rms_px = 0.0;        ///< of the kept views' corners
+  LensDeviation
+      deviation{};  ///< standard deviations of fx fy cx cy k1 k2 p1 p2 k3; of a term held at 0 the one it had free
+  int radial_terms = 3;  ///< of k1 k2 k3: those that the views tell
+  double rms_px = 0.0;   ///< of the kept views' corners
   double worst_view_px = 0.0;
   double median_view_px = 0.0;
   double coverage = 0.0;  ///< share of 8 x 6 fields of the picture in which there are corners
@@ -47,8 +49,13 @@ struct LensFit {
   int kept() const;
 };
 
+/// Takes over the deviations of the radial terms that are held at 0.
+void keep_held(LensDeviation& deviation, int radial_terms, const LensDeviation& free);
+
 /// A lens from views of a board: closed-form start (zhang.h), robust bundle adjustment (Huber at 2 standard deviations), views
-/// that are blurred, faint or do not fit left out by name, single corners too, and least squares over the rest.
+/// that are blurred, faint or do not fit left out by name, single corners too, and least squares over the rest. Of the radial terms k3,
+/// and then k2, is held at 0 where it is less than two of its standard deviations: a small board in the middle of the picture does
+/// not tell it, and in the corners it would be a guess.
 /// Errors: kInvalidArgument when fewer than `fewest_views` are left, with what was wrong with the others; kCancelled.
 Result<LensFit> fit_lens(int width,
                          int height,

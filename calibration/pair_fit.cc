@@ -74,6 +74,7 @@ Kept kept_pair(const PairFit& fit,
                const std::array<Counts, 2>& counts) {
   Kept kept = kept_of(fit.joint_camera, board, views.camera, fit.views, counts[0]);
   kept.bundle.lenses.push_back(fit.joint_projector);
+  kept.bundle.radial_terms = {fit.camera.radial_terms, fit.projector.radial_terms};
   add_sightings(kept, 1, board, views.projector, counts[1]);
   return kept;
 }
@@ -134,6 +135,8 @@ Result<void> fit_together(PairFit& fit,
   if (!last) return last.error();
   take_over_pair(fit, kept, {last->view_rms_px[0], last->view_rms_px[1]});
   fit.deviation = {last->deviation[0], last->deviation[1]};
+  keep_held(fit.deviation[0], fit.camera.radial_terms, fit.camera.deviation);
+  keep_held(fit.deviation[1], fit.projector.radial_terms, fit.projector.deviation);
   fit.place_deviation = last->pose_deviation;
   fit.stereo_rms_px = last->all_rms_px;
   return ok();

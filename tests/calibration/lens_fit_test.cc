@@ -2,11 +2,13 @@
 
 #include "calibration/lens_fit.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "calibration/board_finder.h"
@@ -116,6 +118,65 @@ TEST(LensFit, FindsTheLensWithinItsOwnUncertainty) {
     EXPECT_LT(std::abs(is[i] - should[i]), 4.5 * found->deviation[i]) << i;
   EXPECT_LT(found->deviation[0], 0.002 * found->lens.fx);  // and that is small
   EXPECT_GT(found->coverage, 0.6);
+}
+
+/// Corners of a small board in the middle of a long lens's picture, 0.01 px off at random.
+std::vector<BoardView> small_board_views(const CameraModel& lens, const Board& board) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> off(0.0, 0.01);
+  std::vector<BoardView> views;
+  for (int i = 0; i < 16; ++i) {
+    const double around = 0.4 * i;
+    const double a = std::cos(around);  // tilted by half a radian about (a, b, 0)
+    const double b = std::sin(around);
+    const double c = std::cos(0.5);
+    const double d = std::sin(0.5);
+    Pose tilt;
+    tilt.rotation = {c + (1 - c) * a * a,
+                     (1 - c) * a * b,
+                     d * b,
+                     (1 - c) * a * b,
+                     c + (1 - c) * b * b,
+                     -d * a,
+                     -d * b,
+                     d * a,
+                     c};
+    BoardView view;
+    view.name = fmt::format("pose {}", i + 1);
+    view.blur_px = 0.8;
+    view.contrast = 150.0;
+    for (int id = 0; id < board.corner_count(); ++id) {
+      Vec3 p = tilt.apply(board.corner(id) - Vec3{13.5, 9.0, 0.0});
+      p = p + Vec3{1.5 * std::cos(2.0 * i), 1.5 * std::sin(2.0 * i), 300.0};
+      const auto pixel = lens.project(p);
+      view.corners.push_back({id, {pixel.x + off(random), pixel.y + off(random)}});
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+// With all terms free the corners of the picture, where no board was, are guessed several pixels off.
+TEST(LensFit, HoldsTheRadialTermsThatASmallBoardDoesNotTell) {
+  CameraModel lens;
+  lens.width = lens.height = 400;
+  lens.fx = lens.fy = 2500.0;
+  lens.cx = lens.cy = 200.0;
+  lens.distortion = {-0.08, 0.02, 1e-4, -1e-4, 0.0};
+  const Board board{.squares_x = 10, .squares_y = 7, .square_mm = 3.0};
+  const auto found = fit_lens(400, 400, board, small_board_views(lens, board), {}, {});
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->radial_terms, 1);
+  EXPECT_EQ(found->lens.distortion[1], 0.0);
+  EXPECT_EQ(found->lens.distortion[4], 0.0);
+  EXPECT_GT(found->deviation[8], 1.0);          // of k3, while it was free
+  const auto bend = [](const CameraModel& m) {  // of the ray to the picture's corner, px
+    const Vec3 ray{0.08, 0.08, 1.0};
+    CameraModel straight = m;
+    straight.distortion = {};
+    return m.project(ray).x - straight.project(ray).x;
+  };
+  EXPECT_NEAR(bend(found->lens), bend(lens), 0.5);
 }
 
 TEST(LensFit, AThirdOfTheViewsDefocusedOrHiddenAreNamedAndLeftOut) {
