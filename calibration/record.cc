@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/camera_json.h"
 #include "base/format_version.h"
 
 namespace opaline::calibration {
@@ -56,18 +57,9 @@ std::string_view kind_name(capture::ResponseCurve::Kind kind) {
 }
 
 ordered_json to_json(const MeasuredLens& lens) {
-  const CameraModel& m = lens.model;
-  const Vec3 t = m.camera_from_sample.translation;
-  return {{"width", m.width},
-          {"height", m.height},
-          {"fx", m.fx},
-          {"fy", m.fy},
-          {"cx", m.cx},
-          {"cy", m.cy},
-          {"distortion", m.distortion},
-          {"deviation", lens.deviation},
-          {"rotation", m.camera_from_sample.rotation},
-          {"translation_mm", {t.x, t.y, t.z}}};
+  ordered_json out = camera_to_json(lens.model);
+  out["deviation"] = lens.deviation;
+  return out;
 }
 
 ordered_json to_json(const Measured& m) {
@@ -148,20 +140,7 @@ ColorCorrection color_from(const json& in) {
 }
 
 MeasuredLens lens_from(const json& in) {
-  MeasuredLens lens;
-  CameraModel& m = lens.model;
-  m.width = in.at("width").get<int>();
-  m.height = in.at("height").get<int>();
-  m.fx = in.at("fx").get<double>();
-  m.fy = in.at("fy").get<double>();
-  m.cx = in.at("cx").get<double>();
-  m.cy = in.at("cy").get<double>();
-  m.distortion = in.at("distortion").get<std::array<double, 5>>();
-  lens.deviation = in.at("deviation").get<std::array<double, 9>>();
-  m.camera_from_sample.rotation = in.at("rotation").get<std::array<double, 9>>();
-  const auto t = in.at("translation_mm").get<std::array<double, 3>>();
-  m.camera_from_sample.translation = {t[0], t[1], t[2]};
-  return lens;
+  return {camera_from_json(in), in.at("deviation").get<std::array<double, 9>>()};
 }
 
 Measured measured_from(const json& in) {

@@ -66,6 +66,14 @@ bool has_begun(const SessionDirectory& session) {
   return is_there(session.frames() / "black" / "index.json");
 }
 
+/// The session's own; an empty one where it has none.
+Result<Record> record_of(const SessionDirectory& session) {
+  if (!is_there(session.calibration())) return Record{};
+  const auto text = read_text(session.calibration());
+  if (!text) return text.error();
+  return calibration::record_from_text(*text, session.calibration().string());
+}
+
 Result<capture::StationCalibration> measured_calibration(const SessionDirectory& session,
                                                          const config::RigConfig& rig,
                                                          const fs::path& calibrations,
@@ -75,9 +83,7 @@ Result<capture::StationCalibration> measured_calibration(const SessionDirectory&
                                                          std::stop_token stop) {
   const fs::path own = session.calibration();
   if (is_there(own)) {
-    const auto text = read_text(own);
-    if (!text) return text.error();
-    const auto record = calibration::record_from_text(*text, own.string());
+    const auto record = record_of(session);
     if (!record) return record.error();
     return calibration::with_measured(rig.calibration, record->measured);
   }
@@ -98,14 +104,6 @@ Result<capture::StationCalibration> measured_calibration(const SessionDirectory&
   return calibration::with_measured(rig.calibration, record.measured);
 }
 
-/// What the sensor's steps believe, for the one that looks for the holder.
-Result<Record> record_of(const SessionDirectory& session) {
-  if (!is_there(session.calibration())) return Record{};
-  const auto text = read_text(session.calibration());
-  if (!text) return text.error();
-  return calibration::record_from_text(*text, session.calibration().string());
-}
-
 fs::path placement_file(const SessionDirectory& session) {
   return session.calibration().parent_path() / "placement.json";
 }
@@ -116,7 +114,7 @@ Result<calibration::Placement> found_placement(const SessionDirectory& session,
                                                const capture::Station& station,
                                                EventSink& events,
                                                std::stop_token stop) {
-  auto record = record_of(session);
+  auto record = record_of(session);  // what the sensor's steps believe
   if (!record) return record.error();
   const auto taker = calibration::FrameTaker::create(station, events);
   if (!taker) return taker.error();

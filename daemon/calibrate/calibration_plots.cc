@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/response_fit.h"
+#include "daemon/calibrate/report_figure.h"
 #include "daemon/report/html.h"
 #include "daemon/report/plot.h"
 
@@ -20,16 +21,6 @@ constexpr std::array<const char*, 3> kChannelNames{"red", "green", "blue"};
 constexpr std::array<const char*, 3> kChannelColors{"#c0392b", "#27803b", "#2b5fc0"};
 constexpr const char* kNowColor = "#2b5fc0";
 constexpr const char* kBeforeColor = "#b0b0b0";
-
-template <class Plot>
-std::string figure(const Plot& plot,
-                   std::string_view name,
-                   std::string_view caption,
-                   const std::stop_token& stop) {
-  const auto drawn = draw(plot, name, stop);
-  return drawn ? html::drawing(*drawn, caption)
-               : html::warning(fmt::format("{}: {}", caption, drawn.error().message));
-}
 
 // What a step wrote down under a name; null where it did not.
 nlohmann::json value_of(const Record& record, std::string_view step, const char* name) {

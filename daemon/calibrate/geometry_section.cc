@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "daemon/calibrate/report_figure.h"
 #include "daemon/calibrate/residual_plots.h"
 #include "daemon/report/html.h"
 #include "daemon/report/plot.h"
@@ -28,16 +29,6 @@ constexpr int kBins = 41;
 constexpr double kHistogramSpan = 4.0;  // deviations on either side
 constexpr std::array<const char*, 9> kParameters{
     "fx, px", "fy, px", "cx, px", "cy, px", "k1", "k2", "p1", "p2", "k3"};
-
-template <class Plot>
-std::string plot_figure(const Plot& plot,
-                        std::string_view name,
-                        std::string_view caption,
-                        const std::stop_token& stop) {
-  const auto drawn = draw(plot, name, stop);
-  return drawn ? html::drawing(*drawn, caption)
-               : html::warning(fmt::format("{}: {}", caption, drawn.error().message));
-}
 
 std::vector<CornerResidual> all_of_lens(const std::vector<PoseResiduals>& poses,
                                         std::vector<CornerResidual> PoseResiduals::*lens) {
@@ -127,12 +118,11 @@ std::string residual_histogram(const std::vector<PoseResiduals>& poses,
                  normal_curve(of_camera, sigma, "normal, as wide", "#9fb8e8"),
                  residual_bins(projector, sigma, "projector", kProjectorColor),
                  normal_curve(of_projector, sigma, "normal, as wide", "#ecc98a")};
-  return plot_figure(
-      plot,
-      "residual_histogram",
-      "Residuals of all corners: tails above the normal curve are corners, or poses, "
-      "that do not belong",
-      stop);
+  return figure(plot,
+                "residual_histogram",
+                "Residuals of all corners: tails above the normal curve are corners, or poses, "
+                "that do not belong",
+                stop);
 }
 
 MapPanel coverage_panel(const char* title,
@@ -174,7 +164,7 @@ std::string coverage_map(const Record& record,
       if (std::isfinite(count)) plot.highest = std::max(plot.highest, static_cast<double>(count));
     }
   }
-  return plot_figure(
+  return figure(
       plot,
       "coverage",
       "Where in both pictures corners were, px from the lower left; a white field had none",
@@ -205,11 +195,11 @@ std::string tilt_plot(const StepRecord& step, const std::stop_token& stop) {
   plot.width = 520;
   plot.height = 420;
   plot.series = {std::move(kept)};
-  return plot_figure(plot,
-                     "tilts",
-                     "How the board was tilted: a focal length is told by poses away from the "
-                     "middle, in all directions",
-                     stop);
+  return figure(plot,
+                "tilts",
+                "How the board was tilted: a focal length is told by poses away from the "
+                "middle, in all directions",
+                stop);
 }
 
 std::string pose_rms_plot(const StepRecord& step,
@@ -229,7 +219,7 @@ std::string pose_rms_plot(const StepRecord& step,
   }
   if (plot.groups.empty()) return {};
   plot.series = {std::move(camera), std::move(projector)};
-  return plot_figure(plot, "pose_rms", "What is left of each pose", stop);
+  return figure(plot, "pose_rms", "What is left of each pose", stop);
 }
 
 std::array<double, 9> parameters_of(const CameraModel& lens) {
@@ -251,9 +241,11 @@ void add_lens(TableRows& rows,
   if (!now) return;
   const auto values = parameters_of(now->model);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    std::vector<std::string> row{fmt::format("{}, {}", name, kParameters[i]),
-                                 fmt::format("{:.6g}", values[i]),
-                                 fmt::format("{:.2g}", now->deviation[i])};
+    std::vector<std::string> row{
+        fmt::format("{}, {}", name, kParameters[i]),
+        fmt::format("{:.6g}", values[i]),
+        fmt::format(
+            "{:.2g}{}", now->deviation[i], values[i] == 0.0 ? " when free; held at 0" : "")};
     if (then) {
       const double change = values[i] - parameters_of(then->model)[i];
       const double scatter = std::hypot(now->deviation[i], then->deviation[i]);
