@@ -42,6 +42,7 @@ namespace {
 namespace bench = opaline::bench;
 namespace render = opaline::render;
 using opaline::ThreadTeam;
+using opaline::reconstruct::diffusion::BoundaryModel;
 
 constexpr double kTolerance = 1e-3;
 constexpr int kThreads = 2;
@@ -190,6 +191,18 @@ void measure_transport() {
       bench::print_figure("render.model_error", which, error.model, "1");
       bench::print_figure("render.discretisation_error", which, error.discretisation, "1");
       bench::print_figure("render.monte_carlo_noise", which, error.noise, "1");
+      if (collimated) continue;
+      const auto milne = bench::transport_error(name,
+                                                false,
+                                                {.method = render::Discretisation::kElements,
+                                                 .spacing_mm = spacing,
+                                                 .interior_growth = 0.1,
+                                                 .tolerance = 1e-8,
+                                                 .boundary = BoundaryModel::kMilne},
+                                                kPhotons,
+                                                team);
+      bench::print_figure("render.error_vs_monte_carlo", which + "-milne", milne.total, "1");
+      bench::print_figure("render.model_error", which + "-milne", milne.model, "1");
     }
   }
 }

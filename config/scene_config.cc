@@ -16,7 +16,7 @@ using namespace render;  // NOLINT(google-build-using-namespace): a file about i
 constexpr std::array<std::string_view, 4> kLightKinds{"directional", "point", "spot", "disc"};
 constexpr std::array<std::string_view, 2> kEntries{"collimated", "diffuse"};
 constexpr std::array<std::string_view, 3> kMethods{"graph", "elements", "polygrid"};
-constexpr std::array<std::string_view, 3> kBoundaries{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 4> kBoundaries{"two_moment", "jensen", "keijzer", "milne"};
 
 void visit_picture(Fields& fields, PictureOptions& p) {
   fields.whole({"width", "pixels"}, p.width, Range::between(1, 16384));

@@ -23,7 +23,8 @@ using reconstruct::InverseOptions;
 enum class LightEntry : std::uint8_t { kAuto, kCollimated, kSurface };
 constexpr std::array<std::string_view, 3> kSourceNames{"auto", "collimated", "surface"};
 constexpr std::array<std::string_view, 2> kDepositNames{"centroid", "cell"};
-constexpr std::array<std::string_view, 3> kBoundaryNames{"two_moment", "jensen", "keijzer"};
+constexpr std::array<std::string_view, 4> kBoundaryNames{
+    "two_moment", "jensen", "keijzer", "milne"};
 constexpr std::array<std::string_view, 2> kCameraNames{"refracted_ray", "surface"};
 constexpr std::array<std::string_view, 2> kKindNames{"block", "led_sphere"};
 constexpr std::array<std::string_view, 3> kExposureNames{"bracket", "planned", "fixed"};

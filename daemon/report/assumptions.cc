@@ -14,6 +14,8 @@ std::string boundary(reconstruct::diffusion::BoundaryModel model) {
       return "jensen: A = (1 + Fdr) / (1 - Fdr) (Jensen et al. 2001)";
     case BoundaryModel::kKeijzer:
       return "keijzer: closed form (Keijzer et al. 1988)";
+    case BoundaryModel::kMilne:
+      return "milne: two_moment with the extrapolation length of Milne's problem (Hopf 1934)";
   }
   return "";
 }

@@ -10,6 +10,8 @@
 namespace opaline::reconstruct::diffusion {
 namespace {
 
+constexpr double kHopf = 0.7104460895987627;  // extrapolation length of Milne's problem
+
 // A = (2 / (1 - R0) - 1 + |cos c|^3) / (1 - |cos c|^2), c the critical angle (Schweiger et al.
 // 1995, Eq. 8).
 double keijzer_a(double ior) {
@@ -26,6 +28,8 @@ double boundary_a(BoundaryModel model, double ior, const FresnelMoments& moments
       return (1.0 + moments.fluence) / (1.0 - moments.fluence);
     case BoundaryModel::kKeijzer:
       return keijzer_a(ior);
+    case BoundaryModel::kMilne:
+      return (1.0 + moments.flux) / (1.0 - moments.fluence) + 1.5 * kHopf - 1.0;
   }
   ENSURE(false);
   return 1.0;
@@ -41,6 +45,8 @@ std::string_view to_string(BoundaryModel model) {
       return "jensen";
     case BoundaryModel::kKeijzer:
       return "keijzer";
+    case BoundaryModel::kMilne:
+      return "milne";
   }
   return "two_moment";
 }

@@ -14,8 +14,11 @@ enum class BoundaryModel : std::uint8_t {
                ///< 1994)
   kJensen,     ///< (1 + Fdr) / (1 - Fdr), Fdr exact (Jensen et al. 2001, sec. 2.1)
   kKeijzer,    ///< closed form of Keijzer et al. 1988, as in Schweiger et al. 1995
+  kMilne,      ///< two_moment's and 3/2 0.710446 - 1: at a matched index the extrapolation length
+               ///< 2 A kappa is that of Milne's problem (Hopf 1934), 0.710446 transport mean free
+               ///< paths, in place of 2/3; at other indices the same excess, an assumption
 };
-std::string_view to_string(BoundaryModel model);  ///< "two_moment" | "jensen" | "keijzer"
+std::string_view to_string(BoundaryModel model);  ///< "two_moment" | "jensen" | "keijzer" | "milne"
 
 /// The boundary's constants for one refractive index.
 struct Boundary {

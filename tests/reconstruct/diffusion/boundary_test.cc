@@ -59,6 +59,24 @@ TEST(Boundary, IsTransparentWithoutAnIndexStep) {
   }
 }
 
+/// The share that a half-space reflects of diffuse light at a matched index, without anisotropy: 1 + J_n / q of
+/// phi = S e^(-z / l), S = 4 q.
+double half_space_albedo(BoundaryModel model, double s) {
+  const double rate = s / std::sqrt(3.0);  // kappa / l with s^2 = sigma_a l*
+  return 1.0 - 4.0 * rate / (1.0 + 2.0 * a_of(model, 1.0) * rate);
+}
+
+// Van de Hulst's fit to the exact spherical albedo (Multiple light scattering, 1980, isotropic scattering).
+TEST(Boundary, MilnesHalfSpaceReflectsWhatTransportSays) {
+  for (const double s : {0.05, 0.1, 0.2}) {
+    const double exact = (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s);
+    const double milne = std::abs(half_space_albedo(BoundaryModel::kMilne, s) - exact);
+    const double marshak = std::abs(half_space_albedo(BoundaryModel::kTwoMoment, s) - exact);
+    EXPECT_LT(milne, 0.25 * marshak) << s;
+    EXPECT_LT(milne, 1e-3) << s;
+  }
+}
+
 TEST(Boundary, RefusesAnIndexOutOfRange) {
   for (const double ior : {0.99, 3.01, std::nan("")}) {
     const auto boundary = make_boundary(BoundaryModel::kTwoMoment, ior);
