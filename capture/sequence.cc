@@ -12,7 +12,6 @@
 #include "base/io/dataset_io.h"
 #include "base/log.h"
 #include "base/seconds.h"
-#include "capture/black_taking.h"
 #include "capture/dataset_builder.h"
 #include "capture/disk_space.h"
 #include "capture/exposure_planner.h"
@@ -21,6 +20,7 @@
 #include "capture/hdr_merge.h"
 #include "capture/patterns.h"
 #include "capture/region_taker.h"
+#include "capture/session_black.h"
 #include "capture/stored_frames.h"
 #include "capture/surface_map.h"
 
@@ -30,8 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
-constexpr const char* kBlackName = "black";
-constexpr const char* kWhiteName = "white";      // tells the black
 constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on average at most
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
 
@@ -60,7 +58,9 @@ class Sequence {
         map_(std::move(map)),
         store_(workplace.files, workplace.directory / "frames"),
         dataset_(empty_dataset(task.sample, map_)),
-        started_(station.clock.now()) {}
+        started_(station.clock.now()),
+        black_({task.options, task.calibration.camera}, patterns_, map_, store_, workplace.events) {
+  }
 
   Result<CaptureSummary> run(std::stop_token stop);
 
@@ -73,9 +73,6 @@ class Sequence {
   Result<void> note_plan();
   Result<void> check_space() const;
   Result<RegionTaker*> taker(std::stop_token stop);
-  Result<void> take_black(std::stop_token stop);
-  void use_black(std::vector<CapturedFrame> frames, std::span<const CapturedFrame> white);
-  Result<void> load_black();
   Result<void> do_light(const Light& light, std::stop_token stop);
   /// None when the light is to be taken.
   Result<std::vector<CapturedFrame>> load(const std::string& name, const drivers::Pattern& pattern);
@@ -84,9 +81,6 @@ class Sequence {
   Image<std::uint8_t> ignored_in(const Light& light) const;
   std::unique_ptr<ExposureChooser> chooser_of(const Light& light) const;
   Result<void> confirm_lamp(const std::string& region, std::stop_token stop);
-  Result<std::vector<ExposurePair>> pairs_of(const std::string& name,
-                                             std::span<const CapturedFrame> frames) const;
-  bool shows_light(std::span<const ExposurePair> pairs) const;
   std::string why_masked(const HdrImage& hdr) const;
   Result<void> note_unusable(const Light& light, std::string_view why);
   Result<void> finish();
@@ -101,10 +95,8 @@ class Sequence {
   Dataset dataset_;
   nanoseconds started_;
   CaptureSummary summary_;
-  BlackFrames black_;
-  std::optional<PlannedCells> cells_;
+  SessionBlack black_;
   std::unique_ptr<RegionTaker> taker_;
-  std::optional<HdrMerge> merge_;
   int unusable_regions_ = 0;
 };
 
@@ -125,10 +117,10 @@ Result<void> Sequence::prepare(std::stop_token stop) {
   }
   remove_partial_files(work_.files, work_.directory);
   if (auto noted = note_plan(); !noted) return noted;
-  if (auto loaded = load_black(); !loaded) return loaded;
+  if (auto loaded = black_.load(); !loaded) return loaded;
   const bool complete = std::ranges::all_of(
       patterns_.lights, [this](const Light& light) { return store_.has(light.name); });
-  if (complete && !black_.empty()) return ok();
+  if (complete && !black_.frames().empty()) return ok();
   if (auto devices = taker(stop); !devices) return devices.error();
   return ok();
 }
@@ -146,23 +138,6 @@ Result<void> Sequence::note_plan() {
   return work_.events.fact("capture.planned", {{"regions", regions}, {"held_out", held_out}});
 }
 
-// Frames of white that were there and are damaged leave the black untold: both are taken again.
-Result<void> Sequence::load_black() {
-  auto black = load(kBlackName, patterns_.black);
-  if (!black) return black.error();
-  const bool told = store_.has(kWhiteName);
-  const auto white = load(kWhiteName, patterns_.white);
-  if (!white) return white.error();
-  if (!black->empty() && told != white->empty()) use_black(*std::move(black), *white);
-  return ok();
-}
-
-void Sequence::use_black(std::vector<CapturedFrame> frames, std::span<const CapturedFrame> white) {
-  black_ = BlackFrames(std::move(frames), task_.calibration.camera, map_.footprint(), white);
-  merge_.emplace(task_.calibration.camera, black_.hot());
-  cells_.emplace(map_, black_.footprint(), task_.options.min_coverage);
-}
-
 // The devices are opened only when something is left to take. Where they, or the options, expose
 // otherwise than before, so must the black frames.
 Result<RegionTaker*> Sequence::taker(std::stop_token stop) {
@@ -171,10 +146,11 @@ Result<RegionTaker*> Sequence::taker(std::stop_token stop) {
       RegionTaker::create(station_, {task_.options, task_.calibration.camera}, work_.events);
   if (!made) return made.error();
   taker_ = *std::move(made);
-  taker_->use_black(black_);
+  taker_->use_black(black_.frames());
   if (auto space = check_space(); !space) return space.error();
-  if (!black_.cover(taker_->ladder())) {
-    if (auto black = take_black(stop); !black) return black.error();
+  if (!black_.frames().cover(taker_->ladder())) {
+    const auto watch = [this](nanoseconds exposure) { report(kBlackName, exposure); };
+    if (auto black = black_.take(*taker_, watch, std::move(stop)); !black) return black.error();
   }
   return taker_.get();
 }
@@ -200,58 +176,16 @@ Result<std::vector<CapturedFrame>> Sequence::load(const std::string& name,
   return usable_frames(store_, name, pattern, task_.calibration.camera.model, work_.events);
 }
 
-Result<void> Sequence::take_black(std::stop_token stop) {
-  auto taken = take_blacks(
-      *taker_,
-      patterns_,
-      {task_.options, task_.calibration.camera},
-      map_.footprint(),
-      work_.events,
-      [this](nanoseconds exposure) { report(kBlackName, exposure); },
-      std::move(stop));
-  if (!taken) return taken.error();
-  if (!taken->white.empty()) {
-    if (auto saved = store_.save(kWhiteName, patterns_.white, taken->white); !saved) return saved;
-  }
-  // Last: with it, both count as taken.
-  if (auto saved = store_.save(kBlackName, patterns_.black, taken->black); !saved) return saved;
-  use_black(std::move(taken->black), taken->white);
-  return ok();
-}
-
-Result<std::vector<ExposurePair>> Sequence::pairs_of(const std::string& name,
-                                                     std::span<const CapturedFrame> frames) const {
-  std::vector<ExposurePair> pairs;
-  for (const CapturedFrame& frame : frames) {
-    const auto pair = black_.pair(frame);
-    if (!pair) {
-      return internal_error(
-          fmt::format("{}: no black frame of {:.4g} s: delete frames/{} and start again",
-                      name,
-                      seconds(frame.exposure_asked),
-                      kBlackName));
-    }
-    pairs.push_back(*pair);
-  }
-  return pairs;
-}
-
-bool Sequence::shows_light(std::span<const ExposurePair> pairs) const {
-  return std::ranges::any_of(pairs, [this](const ExposurePair& pair) {
-    return measure_light(task_.calibration.camera, pair, black_.footprint(), 0.0).lit();
-  });
-}
-
 Result<Sequence::Frames> Sequence::frames_of(const Light& light, std::stop_token stop) {
   auto stored = load(light.name, light.pattern);
   if (!stored) return stored.error();
   std::vector<nanoseconds> exposures;
   for (const CapturedFrame& frame : *stored) exposures.push_back(frame.exposure_asked);
-  if (stored->empty() || !black_.cover(exposures)) return take(light, stop);
+  if (stored->empty() || !black_.frames().cover(exposures)) return take(light, stop);
   Frames found{*std::move(stored)};
-  const auto pairs = pairs_of(light.name, found.frames);
+  const auto pairs = black_.pairs(light.name, found.frames);
   if (!pairs) return pairs.error();
-  found.lit = shows_light(*pairs);
+  found.lit = black_.show_light(*pairs);
   return found;
 }
 
@@ -277,9 +211,9 @@ std::unique_ptr<ExposureChooser> Sequence::chooser_of(const Light& light) const 
                                                task_.calibration.camera,
                                                ladder,
                                                seconds(taker_->whole_ladder()),
-                                               *cells_,
+                                               black_.cells(),
                                                ignored_in(light),
-                                               black_.worth(ladder));
+                                               black_.frames().worth(ladder));
     case ExposureMode::kBracket:
       break;
   }
@@ -292,7 +226,7 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
   auto taken = (*devices)->take_light(
       light.name,
       light.pattern,
-      black_,
+      black_.frames(),
       [&](nanoseconds exposure) { report(light.name, exposure); },
       stop,
       [&] { return chooser_of(light); });
@@ -318,7 +252,7 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
 // lamp's.
 Result<void> Sequence::confirm_lamp(const std::string& region, std::stop_token stop) {
   auto white = taker_->take_light(
-      "white", patterns_.white, black_, [&](nanoseconds t) { report("white", t); }, stop);
+      "white", patterns_.white, black_.frames(), [&](nanoseconds t) { report("white", t); }, stop);
   if (!white) return white.error();
   if (white->lit) return ok();
   return unavailable(fmt::format(
@@ -350,9 +284,9 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
   report(light.name, std::nullopt);
   auto found = frames_of(light, stop);
   if (!found) return found.error();
-  const auto pairs = pairs_of(light.name, found->frames);
+  const auto pairs = black_.pairs(light.name, found->frames);
   if (!pairs) return pairs.error();
-  const HdrImage hdr = merge_->merge(*pairs);
+  const HdrImage hdr = black_.merge(*pairs);
   const fs::path path = work_.directory / "hdr" / (light.name + ".exr");
   if (auto written = write_hdr(work_.files, path, hdr); !written) return written;
   const SurfaceRadiance surface = map_.apply(hdr, task_.options.min_coverage);
@@ -373,7 +307,7 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
 }
 
 std::string Sequence::why_masked(const HdrImage& hdr) const {
-  const auto seen = black_.footprint().samples();
+  const auto seen = black_.frames().footprint().samples();
   const auto pixels = std::ranges::count_if(seen, [](std::uint8_t s) { return s != 0; });
   std::ptrdiff_t saturated = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
