@@ -12,7 +12,7 @@
 namespace opaline::daemon {
 
 /// An object of a session's material as the preview has drawn it.
-struct ObjectView {
+struct ObjectView {  // NOLINT(bugprone-exception-escape): a null JSON value throws nothing
   Image<std::uint8_t> picture;  ///< sRGB
   nlohmann::json statistics;    ///< render_report.h, with "white", W/(mm^2 sr)
   std::string drawn_by;

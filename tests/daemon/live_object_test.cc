@@ -58,7 +58,7 @@ class LiveObjectTest : public ::testing::Test {
     session_.emplace(*std::move(made));
     add_object_routes(router_, objects_);
   }
-  ~LiveObjectTest() override {
+  void TearDown() override {
     ask("DELETE", "");
     eventually([&] { return state() != "running" && state() != "starting"; });
   }
@@ -200,7 +200,7 @@ TEST_F(LiveObjectTest, FollowsTheFileAndSaysWhatIsWrongWithIt) {
   EXPECT_GT(largest_difference(picture(), before), 30);
   const auto after = picture();
   ASSERT_TRUE(write_whole(system_files(), scene_file(), "nonsense = 1\n" + scene));
-  ASSERT_TRUE(eventually([&] { return look()["message"] != ""; }));
+  ASSERT_TRUE(eventually([&] { return !look()["message"].get<std::string>().empty(); }));
   EXPECT_THAT(look()["message"].get<std::string>(), HasSubstr("object.toml:1:1"));
   EXPECT_EQ(largest_difference(picture(), after), 0);
   ASSERT_TRUE(write_whole(system_files(), scene_file(), scene));

@@ -58,7 +58,8 @@ class SurfaceLoad : public ::testing::Test {
       for (int i = 0; i < kParts; ++i) {
         for (int k = 0; k < 2 * (kParts - i) - 1; ++k) {
           const double along = (i + (k % 2 == 0 ? 1.0 : 2.0) / 3.0) / kParts;
-          const double across = (k / 2 + (k % 2 == 0 ? 1.0 : 2.0) / 3.0) / kParts;
+          const int pair = k / 2;
+          const double across = (pair + (k % 2 == 0 ? 1.0 : 2.0) / 3.0) / kParts;
           const double q = light(a + (b - a) * along + (c - a) * across) * part;
           sums[t[0]] += q * (1.0 - along - across);
           sums[t[1]] += q * along;
