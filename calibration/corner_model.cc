@@ -154,7 +154,7 @@ std::optional<ModelledCorner> fit_corner(const Image<std::uint8_t>& grey,
   const double squares = minimise(p, pixels);
   const double rms = std::sqrt(squares / static_cast<double>(pixels.size())) / std::abs(p[8]);
   if (!(rms < kMostLeft)) return std::nullopt;
-  return ModelledCorner{{guess.place.x + p[0], guess.place.y + p[1]}, p[4], rms};
+  return ModelledCorner{{guess.place.x + p[0], guess.place.y + p[1]}, p[4], rms, p[8]};
 }
 
 }  // namespace opaline::calibration

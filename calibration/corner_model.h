@@ -20,6 +20,8 @@ struct ModelledCorner {
   CameraModel::Pixel place;
   double blur_px = 0.0;
   double rms = 0.0;  ///< of what the model leaves, over half the step from black to white
+  double step =
+      0.0;  ///< c: half that step with a sign, > 0 where the sides of both edges with e > 0 meet in white
 };
 
 /// The place of a corner of a chessboard to hundredths of a pixel, by least squares of the picture in a disc of `radius` pixels against

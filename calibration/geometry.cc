@@ -168,6 +168,12 @@ Result<void> validate(const GeometryOptions& options) {
   if (auto good = validate(options.board); !good) return good;
   if (options.poses < 6 || options.poses > 100)
     return invalid_argument(fmt::format("board: poses = {}; expected 6 to 100", options.poses));
+  if (options.projected == GeometryOptions::Projected::kChessboards &&
+      options.board.kind != Board::Kind::kChessboard)
+    return invalid_argument(
+        "board: projector = \"chessboards\" with kind = \"charuco\"; expected kind = "
+        "\"chessboard\", "
+        "for markers leave no white paper to project corners on");
   if (!(options.board.known_length_mm > 0.0))
     return invalid_argument(
         "board: known_length is missing; measure with a calliper from the first to the last inner "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 
 #include "base/result.h"
 #include "calibration/board.h"
@@ -9,7 +10,10 @@ namespace opaline::calibration {
 
 /// The board that a station's lenses are measured with, and how it is shown.
 struct GeometryOptions {
+  /// What the projector shows on the board: sinusoids (phase_code.h), or chessboards (projected_boards.h) and coarse sinusoids.
+  enum class Projected : std::uint8_t { kSinusoids, kChessboards };
   Board board{.kind = Board::Kind::kNone};
+  Projected projected = Projected::kSinusoids;
   int poses = 16;                                                   ///< 6 to 100
   std::chrono::nanoseconds time_to_move = std::chrono::seconds(8);  ///< lamp off before each pose
 

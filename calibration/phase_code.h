@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,8 +24,8 @@ struct PhasePlan {
   int width = 640;  ///< of the projector's picture
   int height = 480;
   double gamma = 2.2;
-  std::uint8_t white = 255;                                     ///< the code of the most light
-  std::array<double, 3> shares{1.25, 1.25 / 8.0, 1.25 / 48.0};  ///< periods over the longer side
+  std::uint8_t white = 255;                                   ///< the code of the most light
+  std::vector<double> shares{1.25, 1.25 / 8.0, 1.25 / 48.0};  ///< periods over the longer side
   int steps = 4;
 
   int count() const { return 2 * static_cast<int>(shares.size()) * steps; }

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string_view>
 #include <utility>
 
 #include "calibration/board_finder.h"
+#include "calibration/projected_boards.h"
 
 namespace opaline::calibration {
 namespace {
@@ -65,25 +68,81 @@ PhasePlan plan_of(const StepContext& context, std::uint8_t white) {
   return plan;
 }
 
-Result<ProjectorMap> take_patterns(StepContext& context,
-                                   const std::string& name,
-                                   std::uint8_t white,
-                                   int turns) {
-  const PhasePlan plan = plan_of(context, white);
-  const auto linear = linear_codes(linear_camera(context));
-  const CodeRange range = code_range(context);
-  std::vector<Image<float>> pictures;
-  for (int i = 0; i < plan.count(); ++i) {
-    const auto frame = context.taker.pictured(
-        phase_pattern(plan, i), fmt::format("{}, phase {}", name, i + 1), turns, context.stop);
-    if (!frame) return frame.error();
-    pictures.push_back(grey_light(*frame, linear));
+/// What a pose's camera sees of the projector's patterns, linear and grey.
+class PatternTaker {
+ public:
+  PatternTaker(StepContext& context, const std::string& name, std::uint8_t white, int turns)
+      : context_(context),
+        name_(name),
+        white_(white),
+        turns_(turns),
+        linear_(linear_codes(linear_camera(context))) {}
+
+  Result<ProjectorMap> take_phases(const PhasePlan& plan) const {
+    const auto pictures =
+        take("phase", plan.count(), [&](int i) { return phase_pattern(plan, i); });
+    if (!pictures) return pictures.error();
+    const CodeRange range = code_range(context_);
+    return decode_phases(plan,
+                         *pictures,
+                         kLeastModulation * (linear_[static_cast<std::size_t>(range.clipping)] -
+                                             linear_[static_cast<std::size_t>(range.black)]));
   }
-  return decode_phases(plan,
-                       pictures,
-                       kLeastModulation * (linear[static_cast<std::size_t>(range.clipping)] -
-                                           linear[static_cast<std::size_t>(range.black)]));
-}
+
+  /// The patterns' mean, and where the projector sees the corners that the camera sees in it.
+  struct Answer {
+    Image<float> mean;
+    std::function<BoardView(const BoardView&)> projector_view;
+  };
+  Result<Answer> take_all() const {
+    const PhasePlan plan = plan_of(context_, white_);
+    if (context_.geometry.projected == GeometryOptions::Projected::kChessboards)
+      return take_boards(coarse_plan(plan));
+    auto map = take_phases(plan);
+    if (!map) return map.error();
+    Image<float> mean = map->mean;
+    return Answer{std::move(mean),
+                  [map = *std::move(map), board = context_.geometry.board](const BoardView& view) {
+                    return projector_view(map, view, board);
+                  }};
+  }
+
+ private:
+  Result<Answer> take_boards(const PhasePlan& plan) const {
+    auto map = take_phases(plan);
+    if (!map) return map.error();
+    const ProjectedBoards boards{plan.width, plan.height, white_};
+    auto pictures = take(
+        "projected chessboard", boards.pictures, [&](int k) { return projected_board(boards, k); });
+    if (!pictures) return pictures.error();
+    Image<float> mean = map->mean;
+    return Answer{
+        std::move(mean),
+        [map = *std::move(map), boards, pictures = *std::move(pictures)](const BoardView& view) {
+          return projector_view(map, boards, pictures, view);
+        }};
+  }
+
+  Result<std::vector<Image<float>>> take(
+      std::string_view what,
+      int count,
+      const std::function<Image<std::uint8_t>(int)>& pattern) const {
+    std::vector<Image<float>> pictures;
+    for (int i = 0; i < count; ++i) {
+      const auto frame = context_.taker.pictured(
+          pattern(i), fmt::format("{}, {} {}", name_, what, i + 1), turns_, context_.stop);
+      if (!frame) return frame.error();
+      pictures.push_back(grey_light(*frame, linear_));
+    }
+    return pictures;
+  }
+
+  StepContext& context_;
+  const std::string& name_;
+  std::uint8_t white_;
+  int turns_;
+  std::vector<double> linear_;
+};
 
 }  // namespace
 
@@ -110,22 +169,22 @@ Result<PosePair> take_pose(StepContext& context,
   auto before = find_board(grey, board, name);
   if (!before) return before.error();
   if (!before->fault.empty()) return PosePair{*before, *before, std::move(grey), {}};
-  const auto map = take_patterns(context, name, white->code, brightness.turns);
-  if (!map) return map.error();
+  const auto patterns = PatternTaker(context, name, white->code, brightness.turns).take_all();
+  if (!patterns) return patterns.error();
   const auto last = context.taker.pictured(
       even(context.taker, white->code), name, brightness.turns, context.stop);
   if (!last) return last.error();
   const auto after = find_board(grey_of(last->pixels), board, name);
   if (!after) return after.error();
-  grey = grey_of(map->mean);
+  grey = grey_of(patterns->mean);
   auto camera = find_board(grey, board, name);
   if (!camera) return camera.error();
   const double moved = corners_moved(*before, *after).value_or(0.0);
   if (!after->fault.empty() || moved > kMayMove)
     camera->fault = fmt::format("moved board: by {:.2f} px while the patterns were shown", moved);
   PosePair pose{*std::move(camera), {}, std::move(grey), {}};
-  pose.projector = projector_view(*map, pose.camera, board);
-  pose.paper = paper_light(map->mean, pose.camera, board);
+  pose.projector = patterns->projector_view(pose.camera);
+  pose.paper = paper_light(patterns->mean, pose.camera, board);
   return pose;
 }
 

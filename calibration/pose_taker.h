@@ -24,7 +24,7 @@ struct PosePair {
 /// The median distance of corners that both have, px; none without such corners.
 std::optional<double> corners_moved(const BoardView& before, const BoardView& after);
 
-/// Photographs one pose: white light first, then all phase patterns, then white again. The corners are those of the mean of all patterns,
+/// Photographs one pose: white light first, then the patterns (GeometryOptions::projected), then white again. The corners are those of the mean of all sinusoids,
 /// which has the least noise; when they are elsewhere in the last white frame than in the first, the pose is `moved`. The light is dimmed until
 /// nothing on the board is full.
 ///

@@ -39,6 +39,13 @@ void visit_board(Fields& fields, calibration::GeometryOptions& geometry) {
   fields.check(!geometry.has_board() || board.known_length_mm > 0.0,
                "known_length",
                "measure with a calliper from the first to the last inner corner of a row");
+  fields.one_of({"projector", "what it shows on the board; the latter on a chessboard"},
+                geometry.projected,
+                kProjectedNames);
+  fields.check(geometry.projected == calibration::GeometryOptions::Projected::kSinusoids ||
+                   board.kind != calibration::Board::Kind::kCharuco,
+               "projector",
+               "expected \"sinusoids\" with a ChArUco board: markers leave no white paper");
   fields.whole({"poses", "to show it in"}, geometry.poses, kMostPoses);
   fields.duration({"time_to_move", "lamp off before each pose"}, geometry.time_to_move);
 }

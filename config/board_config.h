@@ -15,6 +15,7 @@
 namespace opaline::config {
 
 inline constexpr std::array<std::string_view, 3> kBoardKindNames{"none", "chessboard", "charuco"};
+inline constexpr std::array<std::string_view, 2> kProjectedNames{"sinusoids", "chessboards"};
 enum class HolderKind : std::uint8_t { kNone, kCharuco };
 inline constexpr std::array<std::string_view, 2> kHolderKindNames{"none", "charuco"};
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -171,14 +172,20 @@ std::optional<std::vector<GeometryFigure>> run_geometry(const GeometryCase& c) {
   return figures_of(c, record, witness);
 }
 
+GeometryCase with_chessboards(GeometryCase c) {
+  c.geometry.projected = calibration::GeometryOptions::Projected::kChessboards;
+  return c;
+}
+
 // The median of the runs, the upper one of an even number, and the worst.
-bool print_runs(const std::string& name, int poses, bool spoiled, int runs) {
+bool print_runs(const std::string& name,
+                int poses,
+                const std::function<GeometryCase(GeometryCase)>& changed,
+                int runs) {
   std::map<std::string, std::vector<double>> values;
   std::vector<GeometryFigure> figures;
   for (int run = 0; run < runs; ++run) {
-    GeometryCase c = geometry_case(name, poses, run);
-    if (spoiled) c = with_bad_poses(std::move(c));
-    auto found = run_geometry(c);
+    auto found = run_geometry(changed(geometry_case(name, poses, run)));
     if (!found) return false;
     figures = *std::move(found);
     for (const GeometryFigure& figure : figures) values[figure.name].push_back(figure.value);
@@ -196,8 +203,9 @@ bool print_runs(const std::string& name, int poses, bool spoiled, int runs) {
 }  // namespace
 
 bool print_geometry(int runs) {
-  const bool sharp = print_runs("sim", 20, false, runs);
-  return print_runs("sim_defocused", 21, true, runs) && sharp;
+  const bool sharp = print_runs("sim", 20, std::identity{}, runs);
+  const bool boards = print_runs("sim_chessboard", 20, with_chessboards, runs);
+  return print_runs("sim_defocused", 21, with_bad_poses, runs) && sharp && boards;
 }
 
 }  // namespace opaline::bench

@@ -155,6 +155,33 @@ TEST_F(GeometryTest, BadPosesAreNamedAndTheRestTellsTheLenses) {
             0.005);
 }
 
+// As above; the place's limit is the one of tests/calibration/pair_fit_test.cc.
+TEST_F(GeometryTest, ChessboardsThatTheProjectorShowsTellItsLensAndPlace) {
+  geometry_.projected = GeometryOptions::Projected::kChessboards;
+  build(8);
+  const auto done = run();
+  ASSERT_TRUE(done) << done.error().message;
+  const StepRecord& step = *record_.find("geometry");
+  ASSERT_TRUE(step.accepted()) << refusal(step);
+  EXPECT_EQ(step.values["poses_kept"], 8) << step.values["poses"].dump(1);
+  EXPECT_LT(std::abs(step.values["length_error"].get<double>()), 0.001);
+  EXPECT_LT(step.values["projector_rms_px"].get<double>(), 0.05);
+  const MeasuredLens& lens = *record_.measured.projector_lens;
+  EXPECT_NEAR(lens.model.fx, scene_.projector.fx, 4.0 * lens.deviation[0]);
+  const Vec3 off = lens.model.centre() - scene_.projector.centre();
+  EXPECT_LT(length(off), 0.005 * length(scene_.projector.centre()));
+}
+
+TEST_F(GeometryTest, ProjectsNoChessboardsOnMarkers) {
+  geometry_.projected = GeometryOptions::Projected::kChessboards;
+  geometry_.board.kind = Board::Kind::kCharuco;
+  geometry_.board.marker_mm = 8.0;
+  build(6);
+  const auto done = run();
+  ASSERT_FALSE(done);
+  EXPECT_THAT(done.error().message, HasSubstr("markers leave no white paper"));
+}
+
 TEST_F(GeometryTest, WrongSquaresAreRefusedByName) {
   geometry_.board.square_mm = 13.1;
   build(6);
