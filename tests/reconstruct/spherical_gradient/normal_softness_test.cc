@@ -74,6 +74,7 @@ ScatteringMaps soft_maps(const Height& z) {
       maps.normal_x.push_back(static_cast<float>(at(x, y).x));
       maps.normal_y.push_back(static_cast<float>(at(x, y).y));
       maps.normal_z.push_back(static_cast<float>(at(x, y).z));
+      maps.curvature_deviation.push_back(1e-4F);
       maps.curvature.push_back(static_cast<float>(
           0.25 * (at(x + 1, y).x - at(x - 1, y).x + at(x, y + 1).y - at(x, y - 1).y) / kPixel));
     }
