@@ -23,8 +23,8 @@ Picture ball_that_shows_its_normal() {
   Picture p;
   for (int y = 0; y < kColumns; ++y)
     for (int x = 0; x < kColumns; ++x) {
-      const double px = (x + 0.5 - kColumns / 2) * kPixel / kRadius;
-      const double py = (y + 0.5 - kColumns / 2) * kPixel / kRadius;
+      const double px = (x + 0.5 - 0.5 * kColumns) * kPixel / kRadius;
+      const double py = (y + 0.5 - 0.5 * kColumns) * kPixel / kRadius;
       const double square = px * px + py * py;
       if (square > 0.5) continue;
       const Vec3 n{px, py, std::sqrt(1.0 - square)};
