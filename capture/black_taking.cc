@@ -6,8 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "base/seconds.h"
-
 namespace opaline::capture {
 namespace {
 
@@ -29,12 +27,6 @@ class Shortest : public ExposureChooser {
  private:
   int left_;
 };
-
-double exposed(const std::vector<CapturedFrame>& frames) {
-  double sum = 0.0;
-  for (const CapturedFrame& frame : frames) sum += seconds(frame.exposure_asked);
-  return sum;
-}
 
 Result<void> note(const TakenBlack& taken, double spent_s, EventSink& events) {
   const bool told = !taken.white.empty();
@@ -65,20 +57,20 @@ Result<TakenBlack> take_blacks(RegionTaker& taker,
   if (!once) return once.error();
   TakenBlack taken{std::move(once->frames), {}};
   if (!planned) return taken;
-  double spent_s = exposed(taken.black);
+  double spent_s = seconds_asked(taken.black);
   auto white = taker.take_light(
       "white", patterns.white, BlackFrames(taken.black, settings.camera, seen), watcher, stop, [] {
         return std::make_unique<Shortest>(kWhiteFrames);
       });
   if (!white) return white.error();
-  spent_s += exposed(white->frames);
+  spent_s += seconds_asked(white->frames);
   if (BlackFrames(taken.black, settings.camera, seen, white->frames).told()) {
     taken.white = std::move(white->frames);
   } else {
     auto repeated = taker.take_black(patterns.black, true, watcher, std::move(stop));
     if (!repeated) return repeated.error();
     taken.black = std::move(repeated->frames);
-    spent_s += exposed(taken.black);
+    spent_s += seconds_asked(taken.black);
   }
   if (auto noted = note(taken, spent_s, events); !noted) return noted.error();
   return taken;

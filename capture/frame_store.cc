@@ -10,6 +10,7 @@
 
 #include "base/format_version.h"
 #include "base/io/image_io.h"
+#include "base/seconds.h"
 #include "base/sha256.h"
 #include "capture/exposure_plan.h"
 
@@ -115,6 +116,12 @@ Result<std::vector<CapturedFrame>> read_frames(const fs::path& directory, const 
 }
 
 }  // namespace
+
+double seconds_asked(std::span<const CapturedFrame> frames) {
+  double sum = 0.0;
+  for (const CapturedFrame& frame : frames) sum += seconds(frame.exposure_asked);
+  return sum;
+}
 
 Result<void> FrameStore::save(const std::string& light,
                               const drivers::Pattern& pattern,

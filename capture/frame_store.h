@@ -22,6 +22,9 @@ struct CapturedFrame {
   Frame frame;
 };
 
+/// The exposures asked for, summed, s.
+double seconds_asked(std::span<const CapturedFrame> frames);
+
 /// What lies on disk of one light.
 struct StoredLight {
   std::vector<CapturedFrame> frames;  ///< none: never captured wholly, of another pattern, damaged

@@ -33,12 +33,6 @@ using std::chrono::nanoseconds;
 constexpr std::uint64_t kRepeats = 3;            // of a planned exposure, on average at most
 constexpr std::uint64_t kSpareBytes = 4u << 20;  // for logs and indices
 
-double seconds_asked(std::span<const CapturedFrame> frames) {
-  double sum = 0.0;
-  for (const CapturedFrame& frame : frames) sum += seconds(frame.exposure_asked);
-  return sum;
-}
-
 bool any_set(const Image<std::uint8_t>& mask) {
   return std::ranges::any_of(mask.samples(), [](std::uint8_t m) { return m != 0; });
 }

@@ -11,8 +11,9 @@ namespace opaline::capture {
 
 /// A black frame as white light tells it.
 struct ToldBlack {
-  Image<float> electrons;  ///< 3 channels; NaN at pixels that do not see the sample
-  int blacks = 1;          ///< the mean of so many black frames would be known as well
+  Image<float>
+      electrons;   ///< 3 channels; NaN at pixels that do not see the sample, or where white clips
+  int blacks = 1;  ///< the mean of so many black frames would be known as well
 };
 
 /// What leaks while the black pattern shows, told by white light. At code 0 a projector sends a small share of what it sends at

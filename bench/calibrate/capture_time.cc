@@ -42,12 +42,6 @@ capture::StationCalibration believed(const sim::RigOptions& o) {
   return c;
 }
 
-double exposed(std::span<const capture::CapturedFrame> frames) {
-  double sum = 0.0;
-  for (const auto& frame : frames) sum += seconds(frame.exposure_asked);
-  return sum;
-}
-
 /// What exposures of 1/30 to 8 s take, each twice the one before.
 double one_stop_seconds() {
   const auto ladder = capture::exposure_ladder(
@@ -94,7 +88,7 @@ class Bed {
                                       {},
                                       {});
     if (!taken) return taken.error();
-    bed->black_seconds_ = exposed(taken->black) + exposed(taken->white);
+    bed->black_seconds_ = seconds_asked(taken->black) + seconds_asked(taken->white);
     bed->black_ = capture::BlackFrames(
         std::move(taken->black), bed->calibration_.camera, bed->map_->footprint(), taken->white);
     bed->cells_.emplace(*bed->map_, bed->black_.footprint(), bed->options_.min_coverage);
@@ -244,8 +238,8 @@ Result<CaptureTime> capture_time(const sim::SceneOptions& scene) {
                "  {}: fixed {:.2f} s, planned {:.2f} s in {} frames, photon limit {:.2f} s, {:.1f} "
                "% of cells\n",
                light.name,
-               exposed(fixed->frames),
-               exposed(planned->frames),
+               seconds_asked(fixed->frames),
+               seconds_asked(planned->frames),
                planned->frames.size(),
                limit,
                100.0 * share);
@@ -253,9 +247,9 @@ Result<CaptureTime> capture_time(const sim::SceneOptions& scene) {
       ++time.out_of_reach;
       continue;
     }
-    time.fixed += exposed(fixed->frames);
+    time.fixed += seconds_asked(fixed->frames);
     time.one_stop += one_stop;
-    time.planned += exposed(planned->frames);
+    time.planned += seconds_asked(planned->frames);
     time.photon_limit += limit;
     time.share_reached = std::min(time.share_reached, share);
     if (i % kEvery == 0) again.push_back(i);

@@ -153,6 +153,10 @@ Result<void> show_object(const SessionDirectory& session,
                          std::stop_token stop) {
   const auto config = config::load_resolved(session);
   if (!config) return config.error();
+  if (config->kind == config::SessionKind::kLedSphere)
+    return invalid_argument(
+        "this session measured an object among lamps, not a block: \"opaline view scene.toml\" "
+        "in its directory shows and edits that object");
   if (auto written = write_object_scene(system_files(), session, *config); !written) return written;
   const auto processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   return LiveObject(session, options, options.threads > 0 ? options.threads : processors)

@@ -36,8 +36,8 @@ struct LiveObjectOptions {
 /// preview/live/
 std::filesystem::path live_object_directory(const SessionDirectory& session);
 
-/// Returns once it is to stop. Errors: kBusy while another shows it; kNotFound before there is a material; those of the first
-/// picture.
+/// Returns once it is to stop. Errors: kBusy while another shows it; kNotFound before there is a material; kInvalidArgument of a session that
+/// measured no block; those of the first picture.
 Result<void> show_object(const SessionDirectory& session,
                          const LiveObjectOptions& options,
                          std::stop_token stop);

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "config/scene_config.h"
 #include "daemon/jobs/control_server.h"
+#include "daemon/preview/json_numbers.h"
 #include "daemon/preview/stroke_text.h"
 
 namespace opaline::daemon {
@@ -18,11 +17,7 @@ constexpr std::size_t kLargestScene = 4u << 20;
 
 Result<Vec3> three(const nlohmann::json& request, const char* key) {
   const auto it = request.find(key);
-  const auto is_finite = [](const nlohmann::json& v) {
-    return v.is_number() && std::isfinite(v.get<double>());
-  };
-  if (it == request.end() || !it->is_array() || it->size() != 3 ||
-      !std::ranges::all_of(*it, is_finite))
+  if (it == request.end() || !is_three_numbers(*it))
     return invalid_argument(fmt::format("\"{}\": expected three numbers", key));
   return Vec3{(*it)[0].get<double>(), (*it)[1].get<double>(), (*it)[2].get<double>()};
 }

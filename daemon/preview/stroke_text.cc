@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <string_view>
+
+#include "daemon/preview/json_numbers.h"
 
 namespace opaline::daemon {
 namespace {
@@ -36,14 +37,6 @@ bool is_word(const nlohmann::json& value) {
          std::ranges::all_of(word, [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; });
 }
 
-bool is_number(const nlohmann::json& value) {
-  return value.is_number() && std::isfinite(value.get<double>());
-}
-
-bool is_three(const nlohmann::json& value) {
-  return value.is_array() && value.size() == 3 && std::ranges::all_of(value, is_number);
-}
-
 std::string number(const nlohmann::json& value, bool is_length) {
   return is_length ? fmt::format("\"{:.9g} mm\"", value.get<double>())
                    : fmt::format("{:.9g}", value.get<double>());
@@ -56,10 +49,10 @@ Result<std::string> value_text(const Key& key, const nlohmann::json& value) {
     return invalid_argument(fmt::format("\"{}\": expected a word", key.name));
   }
   if (key.kind == Kind::kNumber) {
-    if (is_number(value)) return number(value, is_length);
+    if (is_finite_number(value)) return number(value, is_length);
     return invalid_argument(fmt::format("\"{}\": expected a number", key.name));
   }
-  if (!is_three(value))
+  if (!is_three_numbers(value))
     return invalid_argument(fmt::format("\"{}\": expected three numbers", key.name));
   return fmt::format("[{}, {}, {}]",
                      number(value[0], is_length),

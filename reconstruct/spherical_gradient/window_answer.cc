@@ -10,8 +10,8 @@ namespace {
 constexpr double kTableDeviation = 0.01;
 /// The tilt that a camera's slanted look makes, as a depth in mean free paths (tests/reconstruct/spherical_gradient/camera_tilt_test.cc).
 constexpr double kTiltDepth = 1.0;
-/// Of ln D, for bodies that are no balls: on blob_a, of 2000 paths a pixel, the answers are off by 0.038, and noise and the table account for most of it
-/// (`bench led_sphere --blobs --paths 8000000`).
+/// What else ln D is off by on shapes that are no balls: with it nine tenths and more of blob_a, blob_c and blob_d lie within two deviations
+/// (`bench led_sphere --blobs`); chosen by blob_a.
 constexpr double kShapeDeviation = 0.015;
 /// What of the correction for two different principal curvatures is not known.
 constexpr double kUnevenDeviation = 0.3;

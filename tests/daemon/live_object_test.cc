@@ -52,11 +52,16 @@ class LiveObjectTest : public ::testing::Test {
     config::SessionConfig config = *std::move(parsed);
     config.sample.block = plain_material().block;
     config.preview.object_tetrahedra = 2000;
+    make_session("session", config);
+    config.kind = config::SessionKind::kLedSphere;
+    sphere_ = config;
+    add_object_routes(router_, objects_);
+  }
+  void make_session(const char* name, const config::SessionConfig& config) {
     auto made = SessionDirectory::create(
-        system_files(), directory_.path() / "session", {"test", "", "", config::to_toml(config)});
+        system_files(), directory_.path() / name, {"test", "", "", config::to_toml(config)});
     EXPECT_TRUE(made) << made.error().message;
     session_.emplace(*std::move(made));
-    add_object_routes(router_, objects_);
   }
   void TearDown() override {
     ask("DELETE", "");
@@ -99,6 +104,7 @@ class LiveObjectTest : public ::testing::Test {
 
   testing::TemporaryDirectory directory_;
   std::optional<SessionDirectory> session_;
+  config::SessionConfig sphere_;
   LocalExecutor executor_{programs()};
   LiveObjects objects_{[this](const std::string& id) -> Result<SessionDirectory> {
                          if (id != "one") return not_found("there is no such session");
@@ -223,6 +229,17 @@ TEST_F(LiveObjectTest, WaitsForAMaterialAndIsShownOnce) {
   EXPECT_TRUE(shows("state", "over")) << look().dump();
   EXPECT_EQ(ask("DELETE", "").status, 409);
   EXPECT_EQ(wish(kDarkenGreenAndBlue).status, 409);
+}
+
+TEST_F(LiveObjectTest, SaysWhatShowsTheObjectOfASphereOfLights) {
+  make_session("sphere", sphere_);
+  find_material();
+
+  ASSERT_EQ(ask("POST", "").status, 202);
+
+  ASSERT_TRUE(eventually([&] { return state() == "failed"; }, kPatience)) << look().dump();
+  EXPECT_THAT(look().value("message", ""), HasSubstr("opaline view"));
+  EXPECT_FALSE(fs::exists(scene_file()));
 }
 
 TEST_F(LiveObjectTest, StreamsItsFigures) {
