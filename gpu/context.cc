@@ -114,10 +114,7 @@ bool Context::Handles::busy() const {
 Result<std::uint32_t> Context::Handles::memory_type(std::uint32_t allowed,
                                                     vk::MemoryPropertyFlags needed,
                                                     vk::MemoryPropertyFlags liked) const {
-  for (const vk::MemoryPropertyFlags wanted : {needed | liked, needed})
-    for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-      if ((allowed >> i & 1U) != 0 && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
-        return i;
+  if (const auto type = memory_type_of(memory, allowed, needed, liked)) return *type;
   return unavailable(fmt::format("{} has no memory of the kind needed", info.name));
 }
 

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <string_view>
 #include <utility>
-#include <vulkan/vulkan_raii.hpp>
 
 #include "base/ensure.h"
 #include "base/log.h"
@@ -11,6 +10,7 @@
 #include "gpu/buffer.h"
 #include "gpu/commands.h"
 #include "gpu/context.h"
+#include "gpu/device_handles.h"
 #include "gpu/error.h"
 #include "gpu/image.h"
 #include "gpu/pipeline.h"
@@ -36,13 +36,7 @@ auto guarded(std::string_view what, F&& call) -> Result<decltype(call())> {
   }
 }
 
-struct Context::Handles {
-  vk::raii::Context loader;
-  vk::raii::Instance instance = nullptr;
-  vk::raii::DebugUtilsMessengerEXT messenger = nullptr;
-  vk::raii::PhysicalDevice physical = nullptr;
-  vk::raii::Device device = nullptr;
-  vk::raii::Queue queue = nullptr;
+struct Context::Handles : DeviceHandles {
   vk::raii::Semaphore timeline = nullptr;
   vk::PhysicalDeviceMemoryProperties memory;
   std::uint32_t queue_family = 0;
@@ -56,7 +50,7 @@ struct Context::Handles {
 
   /// Whether the device may still use what was submitted: then nothing of it may be destroyed.
   bool busy() const;
-  /// The memory type that has all of `needed` and, if there is one, also `liked`.
+  /// As memory_type_of(). Errors: kUnavailable where there is none.
   Result<std::uint32_t> memory_type(std::uint32_t allowed,
                                     vk::MemoryPropertyFlags needed,
                                     vk::MemoryPropertyFlags liked) const;

@@ -7,28 +7,6 @@
 namespace opaline::gpu {
 namespace {
 
-VKAPI_ATTR VkBool32 VKAPI_CALL hear(VkDebugUtilsMessageSeverityFlagBitsEXT /*severity*/,
-                                    VkDebugUtilsMessageTypeFlagsEXT /*types*/,
-                                    const VkDebugUtilsMessengerCallbackDataEXT* data,
-                                    void* user) {
-  const auto& options = *static_cast<const ContextOptions*>(user);
-  if (options.on_validation_message)
-    options.on_validation_message(data->pMessage);
-  else
-    log::error("Vulkan validation: {}", data->pMessage);
-  return VK_FALSE;
-}
-
-vk::DebugUtilsMessengerCreateInfoEXT messenger_info(ContextOptions& options) {
-  using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
-  using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
-  return {{},
-          Severity::eWarning | Severity::eError,
-          Type::eValidation | Type::ePerformance,
-          &hear,
-          &options};
-}
-
 DeviceKind kind_of(vk::PhysicalDeviceType type) {
   switch (type) {
     case vk::PhysicalDeviceType::eDiscreteGpu:
@@ -107,12 +85,14 @@ Result<void> create_instance(Context::Handles& handles) {
   return guarded("starting Vulkan", [&] {
     const vk::ApplicationInfo application("opaline", 1, nullptr, 0, VK_API_VERSION_1_3);
     vk::InstanceCreateInfo info({}, &application);
-    static constexpr std::array layers{"VK_LAYER_KHRONOS_validation"};
+    static constexpr std::array layers{kValidationLayer};
     static constexpr std::array extensions{VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
                                            VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
     static constexpr vk::ValidationFeatureEnableEXT kBarriers =
         vk::ValidationFeatureEnableEXT::eSynchronizationValidation;
-    auto messenger = messenger_info(handles.options);
+    using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
+    const auto messenger = messenger_info(handles.options.on_validation_message,
+                                          Type::eValidation | Type::ePerformance);
     const vk::ValidationFeaturesEXT features(kBarriers, {}, &messenger);
     if (handles.options.validation) {
       info.setPEnabledLayerNames(layers).setPEnabledExtensionNames(extensions).setPNext(&features);

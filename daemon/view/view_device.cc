@@ -4,30 +4,13 @@
 
 #include <array>
 
-#include "base/log.h"
-
 namespace opaline::daemon {
 namespace {
-
-constexpr const char* kValidation = "VK_LAYER_KHRONOS_validation";
 
 std::string glfw_problem() {
   const char* text = nullptr;
   glfwGetError(&text);
   return text != nullptr ? text : "unknown";
-}
-
-VKAPI_ATTR VkBool32 VKAPI_CALL hear(VkDebugUtilsMessageSeverityFlagBitsEXT,
-                                    VkDebugUtilsMessageTypeFlagsEXT,
-                                    const VkDebugUtilsMessengerCallbackDataEXT* data,
-                                    void* user) {
-  const auto& options = *static_cast<const ViewWindowOptions*>(user);
-  if (options.on_validation_message) {
-    options.on_validation_message(data->pMessage);
-  } else {
-    log::warning("Vulkan: {}", data->pMessage);
-  }
-  return VK_FALSE;
 }
 
 }  // namespace
@@ -54,21 +37,16 @@ void ViewDevice::create_instance() {
   std::vector<const char*> extensions(needed, needed + count);
   std::vector<const char*> layers;
   if (options.validation) {
-    layers.push_back(kValidation);
+    layers.push_back(gpu::kValidationLayer);
     extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
   const vk::ApplicationInfo application("opaline-view", 1, "opaline", 1, VK_API_VERSION_1_1);
   instance = vk::raii::Instance(loader, {{}, &application, layers, extensions});
   if (options.validation) {
-    using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
     using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
     messenger = vk::raii::DebugUtilsMessengerEXT(
         instance,
-        vk::DebugUtilsMessengerCreateInfoEXT({},
-                                             Severity::eWarning | Severity::eError,
-                                             Type::eValidation | Type::eGeneral,
-                                             hear,
-                                             &options));
+        gpu::messenger_info(options.on_validation_message, Type::eValidation | Type::eGeneral));
   }
   VkSurfaceKHR made = VK_NULL_HANDLE;
   if (glfwCreateWindowSurface(*instance, window, nullptr, &made) != VK_SUCCESS) {
@@ -137,12 +115,8 @@ void ViewDevice::run_once() {
 }
 
 std::uint32_t ViewDevice::memory_type(std::uint32_t allowed, vk::MemoryPropertyFlags needed) const {
-  const auto memory = physical.getMemoryProperties();
-  for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
-    if ((allowed >> i & 1U) != 0 && (memory.memoryTypes[i].propertyFlags & needed) == needed) {
-      return i;
-    }
-  }
+  const auto type = gpu::memory_type_of(physical.getMemoryProperties(), allowed, needed);
+  if (type) return *type;
   throw std::runtime_error("the device has no memory of the kind needed");
 }
 

@@ -4,7 +4,7 @@
 #include <GLFW/glfw3.h>
 
 #include "daemon/view/view_window.h"
-#include "gpu/handles.h"
+#include "gpu/device_handles.h"
 
 /// Parts of ViewWindow, for its sources only: <vulkan/vulkan_raii.hpp> costs seconds to compile. Functions throw as Vulkan-Hpp
 /// does.
@@ -25,16 +25,10 @@ struct OwnBuffer {
 };
 
 /// A window, the device that presents in it, and what pictures go through on their way.
-struct ViewDevice {
+struct ViewDevice : gpu::DeviceHandles {
   ViewWindowOptions options;
   GLFWwindow* window = nullptr;
-  vk::raii::Context loader;
-  vk::raii::Instance instance = nullptr;
-  vk::raii::DebugUtilsMessengerEXT messenger = nullptr;
   vk::raii::SurfaceKHR surface = nullptr;
-  vk::raii::PhysicalDevice physical = nullptr;
-  vk::raii::Device device = nullptr;
-  vk::raii::Queue queue = nullptr;
   std::uint32_t family = 0;
   vk::raii::CommandPool pool = nullptr;
   vk::raii::CommandBuffer commands = nullptr;

@@ -10,6 +10,7 @@
 
 #include "base/log.h"
 #include "daemon/view/view_device.h"
+#include "gpu/handles.h"
 
 namespace opaline::daemon {
 namespace {
