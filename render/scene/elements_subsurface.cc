@@ -1,9 +1,8 @@
-#include "render/scene/elements_subsurface.h"
-
 #include <cmath>
 
 #include "render/graph/finite_elements.h"
 #include "render/scene/fresh_hierarchy.h"
+#include "render/scene/subsurface_methods.h"
 #include "render/solver/large_pages.h"
 #include "render/trace/vertex_values.h"
 
@@ -17,18 +16,15 @@ constexpr HierarchyOptions kElementHierarchy{.first_rings = 1};
 
 class ElementsSubsurface final : public Subsurface {
  public:
-  ElementsSubsurface(TetMesh mesh, const DiffusionOptions& options)
-      : Subsurface(std::move(mesh), options),
+  ElementsSubsurface(TetMesh mesh, const SubsurfaceSetting& setting)
+      : Subsurface(std::move(mesh), setting.options),
+        boundary_(setting.boundary),
         phi_(large_vector(mesh_.vertices.size(), Lanes<double>::zero())) {}
 
-  Result<void> begin_with(const SignedDistance& solid,
-                          const MaterialAt& material,
-                          const Boundary& boundary,
-                          ThreadTeam& team) {
-    boundary_ = boundary;
-    if (auto begun = begin(solid, material, team); !begun) return begun;
-    solver_ =
-        std::make_unique<FreshHierarchy<double>>(elements_->matrix(), kElementHierarchy, team);
+  Result<void> begin_with(const SubsurfaceSetting& setting) {
+    if (auto begun = begin(setting.solid, setting.material, setting.team); !begun) return begun;
+    solver_ = std::make_unique<FreshHierarchy<double>>(
+        elements_->matrix(), kElementHierarchy, setting.team);
     return ok();
   }
 
@@ -116,13 +112,9 @@ class ElementsSubsurface final : public Subsurface {
 }  // namespace
 
 Result<std::unique_ptr<Subsurface>> make_elements_subsurface(TetMesh mesh,
-                                                             const SignedDistance& solid,
-                                                             const Subsurface::MaterialAt& material,
-                                                             const Boundary& boundary,
-                                                             const DiffusionOptions& options,
-                                                             ThreadTeam& team) {
-  auto made = std::make_unique<ElementsSubsurface>(std::move(mesh), options);
-  if (auto begun = made->begin_with(solid, material, boundary, team); !begun) return begun.error();
+                                                             const SubsurfaceSetting& setting) {
+  auto made = std::make_unique<ElementsSubsurface>(std::move(mesh), setting);
+  if (auto begun = made->begin_with(setting); !begun) return begun.error();
   return std::unique_ptr<Subsurface>(std::move(made));
 }
 

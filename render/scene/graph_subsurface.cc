@@ -1,5 +1,3 @@
-#include "render/scene/graph_subsurface.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -7,6 +5,7 @@
 #include "render/graph/nearest.h"
 #include "render/graph/two_point.h"
 #include "render/scene/fresh_hierarchy.h"
+#include "render/scene/subsurface_methods.h"
 #include "render/solver/large_pages.h"
 #include "render/trace/vertex_values.h"
 
@@ -22,25 +21,21 @@ constexpr double kSinglePrecision = 1e-5;  // of the residual; below it numbers 
 template <class T, class Graph>
 class GraphSubsurface final : public Subsurface {
  public:
-  GraphSubsurface(Graph graph,
-                  TetMesh mesh,
-                  const Boundary& boundary,
-                  const DiffusionOptions& options)
-      : Subsurface(std::move(mesh), options),
+  GraphSubsurface(Graph graph, TetMesh mesh, const SubsurfaceSetting& setting)
+      : Subsurface(std::move(mesh), setting.options),
         graph_(std::move(graph)),
-        boundary_(boundary),
-        diffusion_(graph_, boundary),
+        boundary_(setting.boundary),
+        diffusion_(graph_, boundary_),
         phi_(large_vector(graph_.inner.size(), Lanes<T>::zero())) {}
 
-  Result<void> begin_with(const SignedDistance& solid,
-                          const MaterialAt& material,
-                          ThreadTeam& team) {
+  Result<void> begin_with(const SubsurfaceSetting& setting) {
     if constexpr (!kIsLattice) {
       if (options_.corrections > 0)
-        lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, team);
+        lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, setting.team);
     }
-    if (auto begun = begin(solid, material, team); !begun) return begun;
-    solver_ = std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, team);
+    if (auto begun = begin(setting.solid, setting.material, setting.team); !begun) return begun;
+    solver_ =
+        std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, setting.team);
     if constexpr (kIsLattice) {
       std::vector<Vec3> places;
       for (const auto& node : graph_.surface) places.push_back(node.place);
@@ -128,50 +123,34 @@ class GraphSubsurface final : public Subsurface {
 template <class T, class Graph>
 Result<std::unique_ptr<Subsurface>> made_of(Graph graph,
                                             TetMesh mesh,
-                                            const SignedDistance& solid,
-                                            const Subsurface::MaterialAt& material,
-                                            const Boundary& boundary,
-                                            const DiffusionOptions& options,
-                                            ThreadTeam& team) {
-  auto made = std::make_unique<GraphSubsurface<T, Graph>>(
-      std::move(graph), std::move(mesh), boundary, options);
-  if (auto begun = made->begin_with(solid, material, team); !begun) return begun.error();
+                                            const SubsurfaceSetting& setting) {
+  auto made =
+      std::make_unique<GraphSubsurface<T, Graph>>(std::move(graph), std::move(mesh), setting);
+  if (auto begun = made->begin_with(setting); !begun) return begun.error();
   return std::unique_ptr<Subsurface>(std::move(made));
 }
 
 template <class Graph>
 Result<std::unique_ptr<Subsurface>> of_precision(Graph graph,
                                                  TetMesh mesh,
-                                                 const SignedDistance& solid,
-                                                 const Subsurface::MaterialAt& material,
-                                                 const Boundary& boundary,
-                                                 const DiffusionOptions& options,
-                                                 ThreadTeam& team) {
+                                                 const SubsurfaceSetting& setting) {
   const auto make =
-      options.tolerance < kSinglePrecision ? made_of<double, Graph> : made_of<float, Graph>;
-  return make(std::move(graph), std::move(mesh), solid, material, boundary, options, team);
+      setting.options.tolerance < kSinglePrecision ? made_of<double, Graph> : made_of<float, Graph>;
+  return make(std::move(graph), std::move(mesh), setting);
 }
 
 }  // namespace
 
 Result<std::unique_ptr<Subsurface>> make_graph_subsurface(TetMesh mesh,
-                                                          const SignedDistance& solid,
-                                                          const Subsurface::MaterialAt& material,
-                                                          const Boundary& boundary,
-                                                          const DiffusionOptions& options,
-                                                          ThreadTeam& team) {
+                                                          const SubsurfaceSetting& setting) {
   QuadGraph graph = make_quad_graph(mesh);
-  return of_precision(std::move(graph), std::move(mesh), solid, material, boundary, options, team);
+  return of_precision(std::move(graph), std::move(mesh), setting);
 }
 
 Result<std::unique_ptr<Subsurface>> make_polygrid_subsurface(Polygrid grid,
                                                              TetMesh mesh,
-                                                             const SignedDistance& solid,
-                                                             const Subsurface::MaterialAt& material,
-                                                             const Boundary& boundary,
-                                                             const DiffusionOptions& options,
-                                                             ThreadTeam& team) {
-  return of_precision(std::move(grid), std::move(mesh), solid, material, boundary, options, team);
+                                                             const SubsurfaceSetting& setting) {
+  return of_precision(std::move(grid), std::move(mesh), setting);
 }
 
 }  // namespace opaline::render

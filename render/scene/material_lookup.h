@@ -28,6 +28,13 @@ struct Coefficients {
   }
 };
 
+/// What each of the three views of a block, along x, y and z, counts where a surface has this normal: fourth powers. Not
+/// scaled to 1.
+inline std::array<double, 3> view_weights(Vec3 normal) {
+  const auto fourth = [](double x) { return x * x * x * x; };
+  return {fourth(normal.x), fourth(normal.y), fourth(normal.z)};
+}
+
 /// Trilinear between the centres of a block's cells, and beyond them by tiling along x, y, z; `place` in the block's frame, mm.
 Coefficients looked_up(const Material& material, Vec3 place, const std::array<Tiling, 3>& tiling);
 

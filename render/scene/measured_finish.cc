@@ -16,8 +16,6 @@ std::array<int, 2> axes_of(Face face) {
   return {across == 0 ? 1 : 0, across == 2 ? 1 : 2};
 }
 
-double fourth(double x) { return x * x * x * x; }
-
 }  // namespace
 
 Result<MeasuredFinish> MeasuredFinish::create(const TranslucentOptions& options) {
@@ -69,7 +67,7 @@ Colour MeasuredFinish::at(Vec3 place, Vec3 normal) const {
     const auto [u, v] = axes_of(surface_.face);
     return on_face(along[u], along[v]);
   }
-  const std::array<double, 3> weights{fourth(normal.x), fourth(normal.y), fourth(normal.z)};
+  const std::array<double, 3> weights = view_weights(normal);
   const std::array<std::array<double, 2>, 3> places{{{p.y, p.z}, {p.z, p.x}, {p.x, p.y}}};
   const double all = weights[0] + weights[1] + weights[2];
   Colour sum{};

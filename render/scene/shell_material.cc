@@ -27,8 +27,6 @@ class InnerSolid final : public SignedDistance {
   double depth_;
 };
 
-double fourth(double x) { return x * x * x * x; }
-
 }  // namespace
 
 Result<ShellMaterial> ShellMaterial::create(std::shared_ptr<const Material> block,
@@ -79,7 +77,7 @@ Coefficients ShellMaterial::in_shell(Vec3 place, double depth) const {
   const Vec3 n = shape_from_scene_.rotate(normal);
   const Vec3 s = (shape_from_scene_.apply(foot) - options_.origin) * (1.0 / options_.scale);
   const double z = block_->block.size().z - depth / options_.scale;
-  const std::array<double, 3> weights{fourth(n.x), fourth(n.y), fourth(n.z)};
+  const std::array<double, 3> weights = view_weights(n);
   const std::array<Vec3, 3> places{Vec3{s.y, s.z, z}, {s.z, s.x, z}, {s.x, s.y, z}};
   const double all = weights[0] + weights[1] + weights[2];
   const std::array<Tiling, 3> tiling{options_.tiling, options_.tiling, Tiling::kClamp};

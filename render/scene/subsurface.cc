@@ -9,15 +9,13 @@
 
 #include "render/graph/polygrid.h"
 #include "render/graph/quad_graph.h"
-#include "render/scene/elements_subsurface.h"
-#include "render/scene/graph_subsurface.h"
+#include "render/scene/subsurface_methods.h"
 #include "render/solver/lane_matrix.h"
 #include "render/tetrahedra/stuffing.h"
 
 namespace opaline::render {
 namespace {
 
-using reconstruct::diffusion::Boundary;
 using reconstruct::diffusion::SolveSummary;
 using reconstruct::diffusion::Termination;
 
@@ -68,23 +66,17 @@ void take_quality(const TetMesh& mesh, Subsurface::Report& report) {
 }
 
 Result<std::unique_ptr<Subsurface>> set_up(TetMesh mesh,
-                                           const SignedDistance& solid,
-                                           const Subsurface::MaterialAt& material,
-                                           const Boundary& boundary,
-                                           const DiffusionOptions& options,
+                                           const SubsurfaceSetting& setting,
                                            double spacing_mm,
-                                           ThreadTeam& team,
                                            std::stop_token stop) {
-  if (options.method == Discretisation::kElements) {
-    return make_elements_subsurface(std::move(mesh), solid, material, boundary, options, team);
+  const Discretisation method = setting.options.method;
+  if (method == Discretisation::kElements) {
+    return make_elements_subsurface(std::move(mesh), setting);
   }
-  if (options.method == Discretisation::kGraph) {
-    return make_graph_subsurface(std::move(mesh), solid, material, boundary, options, team);
-  }
-  auto grid = make_polygrid(solid, spacing_mm, stop);
+  if (method == Discretisation::kGraph) return make_graph_subsurface(std::move(mesh), setting);
+  auto grid = make_polygrid(setting.solid, spacing_mm, std::move(stop));
   if (!grid) return grid.error();
-  return make_polygrid_subsurface(
-      *std::move(grid), std::move(mesh), solid, material, boundary, options, team);
+  return make_polygrid_subsurface(*std::move(grid), std::move(mesh), setting);
 }
 
 /// The vertices of a mesh's surface, numbered as surface_mesh() does.
@@ -140,7 +132,7 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(TetMesh mesh,
   report.spacing_mm = options.spacing_mm;
   take_quality(mesh, report);
   auto made =
-      set_up(std::move(mesh), solid, material, *boundary, options, report.spacing_mm, team, stop);
+      set_up(std::move(mesh), {solid, material, *boundary, options, team}, report.spacing_mm, stop);
   if (!made) return made.error();
   Report& own = (*made)->report_;
   report.unknowns =
