@@ -1,0 +1,181 @@
+#include "bench/render/accuracy_figures.h"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "bench/figure.h"
+#include "bench/render/radiance_error.h"
+#include "bench/render/render_case.h"
+#include "bench/render/sphere_error.h"
+#include "bench/render/transport_error.h"
+#include "render/tetrahedra/stuffing.h"
+
+namespace opaline::bench {
+namespace {
+
+using reconstruct::diffusion::BoundaryModel;
+
+constexpr int kThreads = 2;
+
+/// One method and size, and what each tolerance makes of it.
+void measure_dial(const std::string& which,
+                  const render::SignedDistance& solid,
+                  render::DiffusionOptions options,
+                  const LitMarble& reference,
+                  ThreadTeam& team) {
+  constexpr int kFrames = 9;
+  for (const auto& [tolerances, precision] :
+       {std::pair{std::vector{1e-1, 1e-2, 1e-3, 1e-4}, "single"}, {std::vector{1e-6}, "double"}}) {
+    options.tolerance = tolerances.back();
+    LitMarble marble(solid, options, team);
+    if (precision == std::string("single")) {
+      print_figure("render.dial_unknowns", which, static_cast<double>(marble.unknowns()), "1");
+    }
+    for (const double tolerance : tolerances) {
+      marble.set_tolerance(tolerance);
+      const double seconds = marble.frame_seconds(kFrames);
+      const std::string name = fmt::format("{}-{:.0e}", which, tolerance);
+      print_figure("render.dial_frame_seconds", name, seconds, "s");
+      print_figure("render.dial_error", name, marble.error_against(reference), "1");
+    }
+  }
+}
+
+}  // namespace
+
+void measure_sphere() {
+  ThreadTeam team(kThreads);
+  const auto sphere = shape("sphere");
+  for (const auto& [name, tets] : {std::pair{"13k", 13e3}, std::pair{"52k", 52e3}}) {
+    const render::TetMesh mesh = cut(*sphere, tets);
+    print_figure("render.sphere_tets", name, static_cast<double>(mesh.tets.size()), "1");
+    print_figure("render.sphere_rms_graph", name, graph_error(mesh, 20, team), "1");
+    print_figure("render.sphere_rms_two_point", name, graph_error(mesh, 0, team), "1");
+    print_figure("render.sphere_rms_fem", name, elements_error(mesh, team), "1");
+  }
+  for (const auto& [name, spacing] : {std::pair{"h1.25", 1.25}, std::pair{"h0.8", 0.8}}) {
+    print_figure("render.sphere_rms_polygrid", name, polygrid_error(*sphere, spacing, team), "1");
+  }
+}
+
+void measure_accuracy() {
+  ThreadTeam team(kThreads);
+  for (const char* name : {"torus", "figurine"}) {
+    const auto solid = shape(name);
+    const double spacing = render::spacing_for(render::estimate_volume(*solid), 1.4e5);
+    const auto lit = [&](render::Discretisation method, double size, double growth) {
+      return LitMarble(
+          *solid,
+          {.method = method, .spacing_mm = size, .interior_growth = growth, .tolerance = 1e-8},
+          team);
+    };
+    using enum render::Discretisation;
+    const LitMarble reference = lit(kElements, 0.5 * spacing, 0.0);
+    print_figure("render.reference_error_estimate",
+                 name,
+                 lit(kElements, spacing, 0.0).error_against(reference) / 3.0,
+                 "1");
+    for (const auto& [growth, k] : {std::pair{1.0, "K1"}, std::pair{0.1, "K0.1"}}) {
+      for (const auto& [method, what] : {std::pair{kGraph, "graph"}, std::pair{kElements, "fem"}}) {
+        const LitMarble marble = lit(method, spacing, growth);
+        const std::string which = std::string(name) + "-" + k + "-" + what;
+        print_figure("render.error_vs_fem", which, marble.error_against(reference), "1");
+        print_figure(
+            "render.error_vs_fem_tets", which, static_cast<double>(marble.tetrahedra()), "1");
+      }
+    }
+  }
+}
+
+/// Where the error of elements of K = 0.1 comes from: the same facets with eight times as many elements, and what those are off.
+void measure_geometry() {
+  ThreadTeam team(kThreads);
+  for (const char* name : {"torus", "figurine"}) {
+    const auto solid = shape(name);
+    const double spacing = render::spacing_for(render::estimate_volume(*solid), 1.4e5);
+    const render::DiffusionOptions options{.spacing_mm = spacing, .tolerance = 1e-8};
+    render::DiffusionOptions finer = options;
+    finer.spacing_mm = 0.5 * spacing;
+    finer.interior_growth = 0.0;
+    const LitMarble reference(*solid, finer, team);
+    const render::TetMesh mesh = cut(*solid, 1.4e5, 0.1);
+    const LitMarble coarse(mesh, *solid, options, team);
+    const LitMarble same_facets(cut_into_eight(mesh), *solid, options, team);
+    const std::string which(name);
+    print_figure("render.error_vs_fem", which, coarse.error_against(reference), "1");
+    print_figure("render.error_of_elements", which, coarse.error_against(same_facets), "1");
+    print_figure("render.error_of_facets", which, same_facets.error_against(reference), "1");
+  }
+}
+
+void measure_dials() {
+  ThreadTeam team(1);
+  const auto solid = shape("torus");
+  const double volume = render::estimate_volume(*solid);
+  using enum render::Discretisation;
+  const LitMarble reference(*solid,
+                            {.method = kElements,
+                             .spacing_mm = 0.5 * render::spacing_for(volume, 1.4e5),
+                             .interior_growth = 0.0,
+                             .tolerance = 1e-8},
+                            team);
+  for (const auto& [name, method, corrections] : {std::tuple{"elements", kElements, 0},
+                                                  {"graph", kGraph, 8},
+                                                  {"two_point", kGraph, 0},
+                                                  {"polygrid", kPolygrid, 0}}) {
+    for (const auto& [size, tets] : {std::pair{"30k", 3e4}, {"140k", 1.4e5}}) {
+      for (const auto& [k, growth] : {std::pair{"K0.1", 0.1}, {"K1", 1.0}}) {
+        if (method == kPolygrid && growth == 1.0) continue;  // its lattice has one size
+        measure_dial(fmt::format("{}-{}-{}", name, size, k),
+                     *solid,
+                     {.method = method,
+                      .spacing_mm = render::spacing_for(volume, tets),
+                      .interior_growth = growth,
+                      .corrections = corrections},
+                     reference,
+                     team);
+      }
+    }
+  }
+}
+
+void measure_transport() {
+  constexpr double kPhotons = 1.6e6;
+  ThreadTeam team(kThreads);
+  for (const char* name : {"torus", "figurine"}) {
+    const double spacing = render::spacing_for(render::estimate_volume(*shape(name)), 1.4e5);
+    for (const auto& [collimated, light] :
+         {std::pair{false, "diffuse"}, std::pair{true, "collimated"}}) {
+      const auto error = transport_error(name,
+                                         collimated,
+                                         {.method = render::Discretisation::kElements,
+                                          .spacing_mm = spacing,
+                                          .interior_growth = 0.1,
+                                          .tolerance = 1e-8},
+                                         kPhotons,
+                                         team);
+      const std::string which = std::string(name) + "-" + light;
+      print_figure("render.error_vs_monte_carlo", which, error.total, "1");
+      print_figure("render.model_error", which, error.model, "1");
+      print_figure("render.discretisation_error", which, error.discretisation, "1");
+      print_figure("render.monte_carlo_noise", which, error.noise, "1");
+      if (collimated) continue;
+      const auto milne = transport_error(name,
+                                         false,
+                                         {.method = render::Discretisation::kElements,
+                                          .spacing_mm = spacing,
+                                          .interior_growth = 0.1,
+                                          .tolerance = 1e-8,
+                                          .boundary = BoundaryModel::kMilne},
+                                         kPhotons,
+                                         team);
+      print_figure("render.error_vs_monte_carlo", which + "-milne", milne.total, "1");
+      print_figure("render.model_error", which + "-milne", milne.model, "1");
+    }
+  }
+}
+
+}  // namespace opaline::bench
