@@ -99,6 +99,18 @@ double Vignetting::least() const {
   return least;
 }
 
+double ProjectorCalibration::vignetting_at(int x, int y) const {
+  const double cx = 0.5 * width;
+  const double cy = 0.5 * height;
+  const double dx = x + 0.5 - cx;
+  const double dy = y + 0.5 - cy;
+  return vignetting.at((dx * dx + dy * dy) / (cx * cx + cy * cy));
+}
+
+double ProjectorCalibration::light_of(int code) const {
+  return code == 0 ? 0.0 : (1.0 - black_level) * std::pow(code / 255.0, gamma);
+}
+
 Result<void> validate(const StationCalibration& calibration) {
   const CameraCalibration& c = calibration.camera;
   const ProjectorCalibration& p = calibration.projector;
@@ -125,6 +137,19 @@ Result<void> validate(const StationCalibration& calibration) {
       {positive(c.sensitivity), "camera.sensitivity", c.sensitivity[0], "> 0 in each channel"},
       {p.width > 0 && p.height > 0, "projector.width", 1.0 * p.width, "a size > 0"},
       {p.mm_per_pixel > 0.0, "projector.mm_per_pixel", p.mm_per_pixel, "> 0"},
+      {p.kind == ProjectorKind::kPerpendicular || (p.lens.fx > 0.0 && p.lens.fy > 0.0),
+       "projector.lens.fx",
+       p.lens.fx,
+       "> 0"},
+      {p.kind == ProjectorKind::kPerpendicular ||
+           (p.lens.width == p.width && p.lens.height == p.height),
+       "projector.lens.width",
+       1.0 * p.lens.width,
+       "the picture's"},
+      {p.reference_distance_mm > 0.0,
+       "projector.reference_distance",
+       p.reference_distance_mm,
+       "> 0"},
       {p.gamma > 0.0, "projector.gamma", p.gamma, "> 0"},
       {p.black_level >= 0.0 && p.black_level < 1.0,
        "projector.black_level",

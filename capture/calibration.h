@@ -66,21 +66,41 @@ struct CameraCalibration {
   }
 };
 
-/// What the capture believes of its projector, whose light falls perpendicular on the lit face:
+/// How a projector's picture reaches the lit face.
+enum class ProjectorKind : std::uint8_t {
+  kPerpendicular,  ///< by parallel light, perpendicular on it
+  kPerspective,    ///< through its lens, from where it stands
+};
+
+/// What the capture believes of its projector. With light = vignetting . (black_level + (1 - black_level) (code/255)^gamma), x and y
+/// in its pixels, a point of the lit face receives
 ///
-///   (column mm, row mm) = (x - offset_x_px, y - offset_y_px) . mm_per_pixel     x, y in its pixels
-///   irradiance = peak . vignetting . (black_level + (1 - black_level) (code/255)^gamma)
+///   kPerpendicular  peak . light,   (column mm, row mm) = (x - offset_x_px, y - offset_y_px) . mm_per_pixel
+///   kPerspective    peak . light . (reference_distance / d)^2 . cos(theta),   (x, y) = lens.project(point)
+///
+/// with d the distance from the lens's centre, and theta the angle between its ray and the face's normal.
 struct ProjectorCalibration {
+  ProjectorKind kind = ProjectorKind::kPerpendicular;
   int width = 640;
   int height = 480;
   double mm_per_pixel = 0.05;
   double offset_x_px = 80.0;  ///< the projector pixel at which the lit face's first column begins
   double offset_y_px = 0.0;
+  /// Of kPerspective: an inverse camera, camera_from_sample is projector_from_sample; as large as the picture.
+  CameraModel lens;
+  double reference_distance_mm = 300.0;  ///< at which kPerspective's peak holds
+  /// How well the lens's place before the sample is known, as CameraCalibration::place_covariance, along the projector's axes.
+  std::array<double, 36> place_covariance{};
   double gamma = 2.2;
   double black_level = 0.001;  ///< light at code 0, as a fraction of the peak
   Vignetting vignetting;       ///< about the middle of the projector's picture
   /// At code 255 in the middle, W/mm^2, per channel.
   std::array<double, 3> peak_irradiance{1e-3, 1e-3, 1e-3};
+
+  /// Vignetting of a pixel.
+  double vignetting_at(int x, int y) const;
+  /// Fraction of the peak that a code adds to what code 0 leaks.
+  double light_of(int code) const;
 };
 
 /// Everything measured beforehand about a station; read from the rig file.

@@ -30,7 +30,7 @@ PlannedCells::PlannedCells(const SurfaceMap& map,
     Cell cell;
     cell.place = place;
     double area = 0.0;
-    for (const SurfaceMap::Share& share : map.shares_of(place)) {
+    for (const PixelShare& share : map.shares_of(place)) {
       if (usable.at(share.x, share.y) == 0) continue;
       area += share.area;
       cell.pixels.push_back(

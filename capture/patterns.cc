@@ -6,47 +6,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "capture/face_geometry.h"
 
 namespace opaline::capture {
 namespace {
-
-struct Overlap {
-  int cell = 0;
-  double share = 0.0;  // of the cell's length
-};
-
-// For each projector pixel along one axis, the cells it lies on. Lengths in mm.
-std::vector<std::vector<Overlap>> overlaps(
-    int pixels, double offset_px, double mm_per_pixel, int cells, double cell_mm) {
-  std::vector<std::vector<Overlap>> all(static_cast<std::size_t>(pixels));
-  for (int p = 0; p < pixels; ++p) {
-    const double begin = (p - offset_px) * mm_per_pixel;
-    const double end = begin + mm_per_pixel;
-    const int first = std::max(0, static_cast<int>(std::floor(begin / cell_mm)));
-    for (int c = first; c < cells && c * cell_mm < end; ++c) {
-      const double length = std::min(end, (c + 1) * cell_mm) - std::max(begin, c * cell_mm);
-      if (length > 0.0) all[static_cast<std::size_t>(p)].push_back({c, length / cell_mm});
-    }
-  }
-  return all;
-}
-
-// Fraction of the peak that a code adds to what code 0 leaks.
-double relative_light(const ProjectorCalibration& projector, int code) {
-  return (1.0 - projector.black_level) * std::pow(code / 255.0, projector.gamma);
-}
-
-double vignetting_at(const ProjectorCalibration& projector, int x, int y) {
-  const double cx = 0.5 * projector.width;
-  const double cy = 0.5 * projector.height;
-  const double dx = x + 0.5 - cx;
-  const double dy = y + 0.5 - cy;
-  return projector.vignetting.at((dx * dx + dy * dy) / (cx * cx + cy * cy));
-}
 
 struct NamedRectangle {
   std::string name;
@@ -126,58 +94,13 @@ std::vector<NamedRectangle> rectangles(const PatternOptions& options,
   return lights;
 }
 
-struct PixelRectangle {
-  int left = 0;
-  int top = 0;
-  int right = 0;
-  int bottom = 0;
-};
-
-PixelRectangle pixels_of(const LitRectangle& r, const ProjectorCalibration& p) {
-  constexpr double kFar = 1e9;  // outside every picture, and an int
-  const auto x = [&](double mm) {
-    return static_cast<int>(
-        std::lround(std::clamp(p.offset_x_px + mm / p.mm_per_pixel, -kFar, kFar)));
-  };
-  const auto y = [&](double mm) {
-    return static_cast<int>(
-        std::lround(std::clamp(p.offset_y_px + mm / p.mm_per_pixel, -kFar, kFar)));
-  };
-  return {x(r.left), y(r.top), x(r.left + r.width), y(r.top + r.height)};
-}
-
-Result<PixelRectangle> pixels_within(const NamedRectangle& light,
-                                     const ProjectorCalibration& projector) {
-  const PixelRectangle box = pixels_of(light.rectangle, projector);
-  if (box.left < 0 || box.top < 0 || box.right > projector.width || box.bottom > projector.height) {
-    return invalid_argument(
-        fmt::format("{} needs projector pixels x {} to {}, y {} to {}, and the projector has {} x "
-                    "{}: expected a lit face within its picture",
-                    light.name,
-                    box.left,
-                    box.right,
-                    box.top,
-                    box.bottom,
-                    projector.width,
-                    projector.height));
-  }
-  if (box.right <= box.left || box.bottom <= box.top) {
-    return invalid_argument(
-        fmt::format("{} is smaller than a projector pixel: expected fewer regions", light.name));
-  }
-  return box;
-}
-
-drivers::Pattern pattern_of(const PixelRectangle& box,
+drivers::Pattern pattern_of(const Image<std::uint8_t>& lit,
                             std::uint64_t id,
                             std::uint8_t code,
-                            const ProjectorCalibration& projector) {
-  drivers::Pattern pattern{id, Image<std::uint8_t>(projector.width, projector.height, 3, 0)};
-  for (int y = box.top; y < box.bottom; ++y) {
-    for (int x = box.left; x < box.right; ++x) {
-      for (int c = 0; c < 3; ++c) pattern.codes.at(x, y, c) = code;
-    }
-  }
+                            const std::string& name) {
+  drivers::Pattern pattern{id, Image<std::uint8_t>(lit.width(), lit.height(), 3, 0), name};
+  for (std::size_t i = 0; i < pattern.codes.samples().size(); ++i)
+    if (lit.samples()[i / 3] != 0) pattern.codes.samples()[i] = code;
   return pattern;
 }
 
@@ -193,36 +116,8 @@ drivers::Pattern uniform(std::uint64_t id,
 Image<float> irradiance_of(const Image<std::uint8_t>& codes,
                            const Block& block,
                            Face lit_face,
-                           const ProjectorCalibration& p) {
-  const int width = block.face_width(lit_face);
-  const int height = block.face_height(lit_face);
-  const CellSize cell = face_cell_size(block, lit_face);
-  const auto columns = overlaps(p.width, p.offset_x_px, p.mm_per_pixel, width, cell.width);
-  const auto rows = overlaps(p.height, p.offset_y_px, p.mm_per_pixel, height, cell.height);
-  std::array<double, 256> light{};
-  for (int code = 0; code < 256; ++code) {
-    light[static_cast<std::size_t>(code)] = code == 0 ? 0.0 : relative_light(p, code);
-  }
-  Image<double> sum(width, height, 3);
-  for (int y = 0; y < codes.height(); ++y) {
-    for (int x = 0; x < codes.width(); ++x) {
-      const double falloff = vignetting_at(p, x, y);
-      for (int c = 0; c < 3; ++c) {
-        if (codes.at(x, y, c) == 0) continue;
-        const double e =
-            p.peak_irradiance[static_cast<std::size_t>(c)] * falloff * light[codes.at(x, y, c)];
-        for (const Overlap& row : rows[static_cast<std::size_t>(y)]) {
-          for (const Overlap& column : columns[static_cast<std::size_t>(x)]) {
-            sum.at(column.cell, row.cell, c) += e * row.share * column.share;
-          }
-        }
-      }
-    }
-  }
-  Image<float> irradiance(width, height, 3);
-  std::ranges::transform(
-      sum.samples(), irradiance.samples().begin(), [](double e) { return static_cast<float>(e); });
-  return irradiance;
+                           const ProjectorCalibration& projector) {
+  return make_face_light(block, lit_face, projector)->irradiance(codes);
 }
 
 Result<PatternSet> make_patterns(const PatternOptions& options,
@@ -233,13 +128,14 @@ Result<PatternSet> make_patterns(const PatternOptions& options,
                  uniform(kWhitePattern, projector, 255, "white"),
                  {}};
   std::uint64_t id = kFirstLight;
+  const auto face = make_face_light(block, lit_face, projector);
   for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
-    const auto box = pixels_within(light, projector);
-    if (!box) return box.error();
+    if (auto reached = face->check(light.rectangle); !reached)
+      return reached.error().in(light.name);
     const int code = light.uniform ? options.uniform_light_code : 255;
-    drivers::Pattern pattern = pattern_of(*box, id++, static_cast<std::uint8_t>(code), projector);
-    pattern.name = light.name;
-    Image<float> irradiance = irradiance_of(pattern.codes, block, lit_face, projector);
+    drivers::Pattern pattern = pattern_of(
+        face->pixels_on(light.rectangle), id++, static_cast<std::uint8_t>(code), light.name);
+    Image<float> irradiance = face->irradiance(pattern.codes);
     set.lights.push_back(
         {light.name, light.held_out, light.uniform, std::move(pattern), std::move(irradiance)});
   }
@@ -250,8 +146,10 @@ Result<void> check_patterns(const PatternOptions& options,
                             const Block& block,
                             Face lit_face,
                             const ProjectorCalibration& projector) {
+  const auto face = make_face_light(block, lit_face, projector);
   for (const NamedRectangle& light : rectangles(options, block, lit_face)) {
-    if (const auto box = pixels_within(light, projector); !box) return box.error();
+    if (auto reached = face->check(light.rectangle); !reached)
+      return reached.error().in(light.name);
   }
   return ok();
 }

@@ -9,6 +9,7 @@
 #include "base/result.h"
 #include "capture/calibration.h"
 #include "capture/capture_options.h"
+#include "capture/face_light.h"
 #include "drivers/projector.h"
 
 namespace opaline::capture {
@@ -17,14 +18,6 @@ namespace opaline::capture {
 inline constexpr std::uint64_t kBlackPattern = 1;
 inline constexpr std::uint64_t kWhitePattern = 2;
 inline constexpr std::uint64_t kFirstLight = 16;
-
-/// A rectangle on the lit face, mm from the corner where its raster begins.
-struct LitRectangle {
-  double left = 0.0;
-  double top = 0.0;
-  double width = 0.0;
-  double height = 0.0;
-};
 
 /// One light the sample is measured under.
 struct Light {
@@ -46,9 +39,8 @@ struct PatternSet {
 /// ("held_out_shifted_K"), twice and half as large ("held_out_large_K", "held_out_small_K"), as
 /// many of each in turn as fit the face and differ; at last "uniform", the whole face, if wanted.
 ///
-/// Light falls on whole projector pixels: a rectangle ends at the nearest edges, and its irradiance
-/// is what these pixels send, cell by cell by area. Errors: kInvalidArgument when the projector
-/// does not reach the whole face or a light has no pixel.
+/// Light falls on whole projector pixels, and its irradiance is what these send (face_light.h). Errors: kInvalidArgument when the
+/// projector does not reach the whole face or a light has no pixel.
 Result<PatternSet> make_patterns(const PatternOptions& options,
                                  const Block& block,
                                  Face lit_face,
@@ -60,8 +52,7 @@ Result<void> check_patterns(const PatternOptions& options,
                             Face lit_face,
                             const ProjectorCalibration& projector);
 
-/// Irradiance on the lit face's cells while the projector shows `codes`, less that of code 0: each
-/// pixel's light, shared among cells by the area it covers of each (exact overlap).
+/// Irradiance on the lit face's cells while the projector shows `codes`, less that of code 0.
 Image<float> irradiance_of(const Image<std::uint8_t>& codes,
                            const Block& block,
                            Face lit_face,

@@ -375,6 +375,7 @@ Result<CaptureSummary> capture_session(const CaptureTask& task,
   auto map = SurfaceMap::create(
       task.sample.block, task.sample.seen_face, camera.model, camera.place_covariance);
   if (!map) return map.error();
+  map->add_light_slip(task.sample.block, task.sample.lit_face, task.calibration.projector);
   return Sequence(task, station, workplace, *std::move(patterns), *std::move(map)).run(stop);
 }
 

@@ -9,7 +9,9 @@
 #include "base/face_view.h"
 #include "base/image.h"
 #include "base/result.h"
+#include "capture/calibration.h"
 #include "capture/hdr_merge.h"
+#include "capture/pixel_shares.h"
 
 namespace opaline::capture {
 
@@ -27,12 +29,8 @@ struct SurfaceRadiance {
 /// shared (exact clipping), and its variance the sum of theirs with the weights squared. Pixels
 /// that reach over the face's edge see something else as well and are left out.
 ///
-/// Where the camera's place is not exact, nor is the point of the face that a pixel sees. A small motion of what the camera sees moves
-/// the point p under its ray of direction d, on the face of normal n, by
-///
-///   u = -(m - d (n m) / (n d)),    m = [w]x R p + s in the sample's frame
-///
-/// (CameraCalibration::place_covariance), and a cell's variance gains g' Cov(u) g with g the radiance's slope there, by differences
+/// Where the camera's place is not exact (CameraCalibration::place_covariance), nor is the point of the face that a pixel sees
+/// (slip_of_cell), and a cell's variance gains g' Cov(u) g with g the radiance's slope there, by differences
 /// of its neighbours. All cells and lights share that error; as a variance it tells where the place matters, at edges and veins.
 class SurfaceMap {
  public:
@@ -45,43 +43,35 @@ class SurfaceMap {
   /// What create() would say against it, without the work: whether some cell's middle is in the
   /// picture.
   static Result<void> check(const Block& block, Face face, const CameraModel& camera);
+  /// Where it is not exact what the light falls on: a light that slips moves all that it does to an even sample along, so its slip
+  /// adds to that of the point seen. Of a projector in perspective (its place_covariance) that lights this face or the one opposite.
+  void add_light_slip(const Block& block, Face lit_face, const ProjectorCalibration& projector);
   /// A cell needs `min_coverage` of its area on usable pixels.
   SurfaceRadiance apply(const HdrImage& hdr, double min_coverage) const;
   /// 1 for camera pixels that lie wholly on the face.
   const Image<std::uint8_t>& footprint() const { return footprint_; }
   const FaceView& view() const { return view_; }
 
-  /// What a cell has of a camera pixel.
-  struct Share {
-    int x;
-    int y;
-    float area;  ///< of the pixel, in pixels
-  };
   std::size_t cell_count() const { return cells_.size(); }
   /// Of the cell at this place of the face's raster, row by row.
-  const std::vector<Share>& shares_of(std::size_t place) const { return cells_[place].shares; }
-  double cell_area(std::size_t place) const { return cells_[place].area; }  ///< pixels
+  const std::vector<PixelShare>& shares_of(std::size_t place) const {
+    return cells_[place].pixels.shares;
+  }
+  double cell_area(std::size_t place) const { return cells_[place].pixels.area; }  ///< pixels
 
-  /// Of the point seen where a cell should be: variances along columns and rows, and their covariance, in cells.
-  struct PlaceVariance {
-    double column = 0.0;
-    double row = 0.0;
-    double both = 0.0;
-  };
-  const PlaceVariance& place_of(std::size_t place) const { return cells_[place].place; }
+  const PointVariance& place_of(std::size_t place) const { return cells_[place].place; }
   /// The largest standard deviation of them, in cells, either way.
   double place_deviation() const;
 
  private:
   struct Cell {
-    std::vector<Share> shares;
-    double area = 0.0;  // of the whole quadrilateral, in pixels
-    PlaceVariance place;
+    CellPixels pixels;
+    PointVariance place;  // of the point seen
   };
-  SurfaceMap(int width, int height) : width_(width), height_(height) {}
-  void add_cell(const std::vector<CameraModel::Pixel>& corners, const CameraModel& camera);
+  SurfaceMap(Face face, int width, int height) : face_(face), width_(width), height_(height) {}
   void drop_partial_pixels(const CameraModel& camera);
   void add_place_variance(SurfaceRadiance& surface) const;
+  Face face_;
   int width_;
   int height_;
   std::vector<Cell> cells_;  // row by row

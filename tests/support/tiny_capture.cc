@@ -23,15 +23,15 @@ capture::StationCalibration calibration_of(const sim::RigOptions& options) {
   calibration.camera.read_noise_electrons = c.read_noise_electrons;
   calibration.camera.vignetting = {c.vignetting};
   calibration.camera.sensitivity = c.sensitivity;
-  calibration.projector = {p.width,
-                           p.height,
-                           p.mm_per_pixel,
-                           p.offset_x_px,
-                           p.offset_y_px,
-                           p.gamma,
-                           p.black_level,
-                           {p.vignetting},
-                           p.peak_irradiance};
+  calibration.projector.width = p.width;
+  calibration.projector.height = p.height;
+  calibration.projector.mm_per_pixel = p.mm_per_pixel;
+  calibration.projector.offset_x_px = p.offset_x_px;
+  calibration.projector.offset_y_px = p.offset_y_px;
+  calibration.projector.gamma = p.gamma;
+  calibration.projector.black_level = p.black_level;
+  calibration.projector.vignetting = {p.vignetting};
+  calibration.projector.peak_irradiance = p.peak_irradiance;
   return calibration;
 }
 
