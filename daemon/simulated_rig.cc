@@ -192,11 +192,17 @@ Result<std::unique_ptr<sim::Rig>> holder_rig(const sim::HolderScene& holder,
   if (auto good = sim::validate(holder); !good) return good.error().in("sim");
   if (auto good = sim::check_responses(*responses, options.camera.model); !good)
     return good.error().in("transport responses");
-  return sim::Rig::create(
-      options,
-      std::make_shared<const sim::HolderOptics>(
-          options.camera, options.projector, std::move(responses), holder, options.surface),
-      clock);
+  const bool is_lit = options.projector.kind == sim::ProjectorKind::kPerspective &&
+                      responses->lit_face == responses->seen_face;
+  std::shared_ptr<const sim::LightPath> path;
+  if (is_lit) {
+    path = std::make_shared<const sim::LitHolderOptics>(
+        options.camera, options.projector, std::move(responses), holder, options.surface);
+  } else {
+    path = std::make_shared<const sim::HolderOptics>(
+        options.camera, options.projector, std::move(responses), holder, options.surface);
+  }
+  return sim::Rig::create(options, std::move(path), clock);
 }
 
 }  // namespace

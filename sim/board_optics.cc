@@ -90,6 +90,7 @@ BoardOptics::Look BoardOptics::look(const SimBoardPose& pose) const {
     return out;
   }();
   const Vec3 eye = board_from_camera.translation;
+  const Vec3 camera_eye = camera_.model.centre();
   const Vec3 lamp = pose.sample_from_board.inverse().apply(scene_.projector.centre());
   const double hidden_from = (1.0 - pose.hidden) * board.width_mm();
   const double pixel = 1.0 / camera_.model.fx / kAcross;
@@ -99,6 +100,8 @@ BoardOptics::Look BoardOptics::look(const SimBoardPose& pose) const {
     const Vec3 d = board_from_camera.rotate({rays_[2 * i], rays_[2 * i + 1], 1.0});
     const double t = -eye.z / d.z;
     if (!(t > 0.0)) continue;
+    if (scene_.sample && scene_.sample->holds(camera_eye, pose.sample_from_board.rotate(d)))
+      continue;
     const double x = eye.x + t * d.x;
     const double y = eye.y + t * d.y;
     const double a = board.albedo(x, y, t * pixel);

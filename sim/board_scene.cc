@@ -109,6 +109,20 @@ double SimBoard::albedo(double x_mm, double y_mm, double footprint_mm) const {
   return 0.5 * (white + black) - 0.5 * (white - black) * alike;
 }
 
+bool SeenFace::holds(Vec3 eye, Vec3 ray) const {
+  const auto along = [](Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
+  const int normal = axis_of(face);
+  const Vec3 size = block.size();
+  const double at = is_max(face) ? along(size, normal) : 0.0;
+  const double t = (at - along(eye, normal)) / along(ray, normal);
+  const Vec3 hit = eye + ray * t;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis != normal && !(along(hit, axis) >= 0.0 && along(hit, axis) <= along(size, axis)))
+      return false;
+  }
+  return t > 0.0;
+}
+
 Result<void> validate(const BoardSceneOptions& options) {
   const SimBoard& board = options.board;
   if (board.squares_x < 3 || board.squares_y < 3 || !(board.square_mm > 0.0))

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
+#include "base/block.h"
 #include "base/camera_model.h"
 #include "base/pose.h"
 #include "base/result.h"
@@ -39,6 +41,15 @@ struct SimBoardPose {
   double hidden = 0.0;      ///< share of the board's width, from the right, that a hand covers
 };
 
+/// A face of a sample that is seen in place of what lies around it.
+struct SeenFace {
+  Block block;
+  Face face = Face::kZMax;
+
+  /// Whether a ray, in the sample's frame, meets it.
+  bool holds(Vec3 eye, Vec3 ray) const;
+};
+
 /// What a simulated operator shows a camera and a projector.
 struct BoardSceneOptions {
   SimBoard board;
@@ -50,7 +61,8 @@ struct BoardSceneOptions {
   double focus_mm = 350.0;               ///< distance from the camera at which a board is sharp
   double focus_px =
       1.0;  ///< blur far behind that: sigma = focus_px |1 - focus_mm / distance| besides the PSF
-  double nudge_mm = 1.0;  ///< by how much a board moves that is knocked against
+  double nudge_mm = 1.0;           ///< by how much a board moves that is knocked against
+  std::optional<SeenFace> sample;  ///< the board is cut out where this is seen
 };
 Result<void> validate(const BoardSceneOptions& options);
 

@@ -12,27 +12,6 @@ namespace {
 
 constexpr int kPlacesAcross = 2;  // of a pixel, each way
 
-double along(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
-
-/// The plane of the sample's seen face.
-struct FacePlane {
-  const Block& block;
-  Face face;
-
-  bool holds(Vec3 eye, Vec3 ray) const {
-    const int normal = axis_of(face);
-    const Vec3 size = block.size();
-    const double at = is_max(face) ? along(size, normal) : 0.0;
-    const double t = (at - along(eye, normal)) / along(ray, normal);
-    const Vec3 hit = eye + ray * t;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (axis != normal && !(along(hit, axis) >= 0.0 && along(hit, axis) <= along(size, axis)))
-        return false;
-    }
-    return t > 0.0;
-  }
-};
-
 /// What a ray sees of the board.
 double albedo_along(const HolderScene& holder, Vec3 eye, Vec3 ray, double focal_px) {
   const Pose board_from_sample = holder.sample_from_board.inverse();
@@ -48,7 +27,7 @@ Image<float> albedo_seen(const CameraOptics& camera,
                          const TransportResponses& responses,
                          const HolderScene& holder) {
   const CameraModel& lens = camera.model;
-  const FacePlane face{responses.block, responses.seen_face};
+  const SeenFace face{responses.block, responses.seen_face};
   const Vec3 eye = lens.centre();
   Image<float> seen(lens.width, lens.height, 1);
   for (int y = 0; y < lens.height * kPlacesAcross; ++y) {
@@ -69,13 +48,12 @@ Image<std::uint8_t> pixels_beside(const ProjectorOptics& projector,
   const Block& block = responses.block;
   const Face face = responses.lit_face;
   const Vec3 size = block.size();
-  const double width = along(size, axis_of(face) == 0 ? 1 : 0);
-  const double height = along(size, axis_of(face) == 2 ? 1 : 2);
+  const double width = axis_of(face) == 0 ? size.y : size.x;
+  const double height = axis_of(face) == 2 ? size.y : size.z;
   Image<std::uint8_t> beside(projector.width, projector.height, 1);
   for (int y = 0; y < projector.height; ++y) {
     for (int x = 0; x < projector.width; ++x) {
-      const double column = (x + 0.5 - projector.offset_x_px) * projector.mm_per_pixel;
-      const double row = (y + 0.5 - projector.offset_y_px) * projector.mm_per_pixel;
+      const auto [column, row] = lit_by(projector, block, face, x + 0.5, y + 0.5);
       const bool on = column >= 0.0 && row >= 0.0 && column <= width && row <= height;
       beside.at(x, y) = on ? 0 : 1;
     }
@@ -92,6 +70,29 @@ Result<void> validate(const HolderScene& holder) {
       .above("holder.square_mm", holder.board.square_mm, 0.0)
       .within("holder.glow", holder.glow, 0.0, 1.0);
   return check.result();
+}
+
+LitHolderOptics::LitHolderOptics(const CameraOptics& camera,
+                                 const ProjectorOptics& projector,
+                                 std::shared_ptr<const TransportResponses> responses,
+                                 const HolderScene& holder,
+                                 const SurfaceOptions& surface)
+    : sample_(camera, projector, responses, surface),
+      holder_(camera,
+              projector,
+              {.board = holder.board,
+               .poses = {{.sample_from_board = holder.sample_from_board}},
+               .projector = projector.lens,
+               .reference_distance_mm = projector.reference_distance_mm,
+               .focus_px = 0.0,
+               .sample = SeenFace{responses->block, responses->seen_face}}) {}
+
+StationLight LitHolderOptics::light(const Image<std::uint8_t>& codes) const {
+  StationLight light = sample_.light(codes);
+  const StationLight around = holder_.light(codes);
+  for (std::size_t i = 0; i < light.sensor_radiance.samples().size(); ++i)
+    light.sensor_radiance.samples()[i] += around.sensor_radiance.samples()[i];
+  return light;
 }
 
 HolderOptics::HolderOptics(const CameraOptics& camera,

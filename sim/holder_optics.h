@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "sim/board_optics.h"
 #include "sim/board_scene.h"
 #include "sim/station_light.h"
 
@@ -23,7 +24,7 @@ struct HolderScene {
 };
 Result<void> validate(const HolderScene& holder);
 
-/// A sample in its holder. The projector's light that falls beside the sample, on average over there, spreads in the acrylic and leaves
+/// A sample in its holder, lit from behind. The projector's light that falls beside the sample, on average over there, spreads in the acrylic and leaves
 /// it evenly: a camera pixel that sees the board's plane outside the sample's seen face has
 ///
 ///   L = a / pi . glow . mean irradiance beside the sample
@@ -56,6 +57,29 @@ class HolderOptics : public LightPath {
   Image<std::uint8_t> is_beside_;  // 1: a projector pixel whose middle does not fall on the sample
   Image<float> albedo_;            // over pi, as the camera's pixels see it, blurred
   Image<float> vignetting_;
+};
+
+/// The same in front of camera and projector both, the latter in perspective: its light falls on the printed board, which is matt (board_optics.h).
+/// Holder and sample shed no light on each other.
+///
+/// Threads: const, so any number at a time.
+class LitHolderOptics : public LightPath {
+ public:
+  LitHolderOptics(const CameraOptics& camera,
+                  const ProjectorOptics& projector,
+                  std::shared_ptr<const TransportResponses> responses,
+                  const HolderScene& holder,
+                  const SurfaceOptions& surface = {});
+
+  StationLight light(const Image<std::uint8_t>& codes) const override;
+  StationLight dark() const override { return sample_.dark(); }
+  int patches_x() const override { return sample_.patches_x(); }
+  int patches_y() const override { return sample_.patches_y(); }
+  std::string scene() const override { return sample_.scene(); }
+
+ private:
+  StationOptics sample_;
+  BoardOptics holder_;
 };
 
 }  // namespace opaline::sim

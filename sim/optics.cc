@@ -24,46 +24,6 @@ void check_vignetting(OptionsCheck& check, const std::array<double, 3>& v) {
   }
 }
 
-/// Pixels along one axis that a patch covers, and how much of each.
-struct Coverage {
-  int first = 0;
-  std::vector<double> share;
-};
-
-Coverage coverage(double from, double to, int size) {
-  Coverage covered;
-  covered.first = std::clamp(static_cast<int>(std::floor(from)), 0, size);
-  const int end = std::clamp(static_cast<int>(std::ceil(to)), covered.first, size);
-  for (int i = covered.first; i < end; ++i) {
-    covered.share.push_back(std::max(0.0, std::min(to, i + 1.0) - std::max(from, 1.0 * i)));
-  }
-  return covered;
-}
-
-/// Irradiance of every projector pixel over the peak.
-Image<float> relative_light(const ProjectorOptics& options, const Image<std::uint8_t>& codes) {
-  const std::array<float, 256> light = light_of_codes(options);
-  const Image<float> falloff = vignetting_map(codes.width(), codes.height(), options.vignetting);
-  Image<float> picture(codes.width(), codes.height(), 3);
-  for (std::size_t i = 0; i < picture.samples().size(); ++i) {
-    picture.samples()[i] = light[codes.samples()[i]] * falloff.samples()[i / 3];
-  }
-  return picture;
-}
-
-Rgb sum_over(const Image<float>& picture, const Coverage& columns, const Coverage& rows) {
-  Rgb sum{};
-  for (std::size_t j = 0; j < rows.share.size(); ++j) {
-    for (std::size_t i = 0; i < columns.share.size(); ++i) {
-      const double share = rows.share[j] * columns.share[i];
-      const int x = columns.first + static_cast<int>(i);
-      const int y = rows.first + static_cast<int>(j);
-      for (int c = 0; c < 3; ++c) sum[c] += share * picture.at(x, y, c);
-    }
-  }
-  return sum;
-}
-
 /// Seconds for which a channel's third of the wheel stood in the light since time zero.
 double segment_seconds(double turn, int channel, double until) {
   const double turns = std::floor(until / turn);
@@ -93,6 +53,22 @@ CameraModel demo_camera_model() {
   model.distortion = {-0.08, 0.02, 1e-4, -1e-4, 0.0};
   model.camera_from_sample = look_at(centre, target, {0.0, 1.0, 0.0});
   return model;
+}
+
+CameraModel demo_projector_lens() {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const Vec3 target{12.0, 12.0, 6.0};
+  const Vec3 way = normalized({std::tan(4.0 * kDegree), -std::tan(7.0 * kDegree), 1.0});
+  CameraModel lens;
+  lens.width = 640;
+  lens.height = 480;
+  lens.fx = 3300.0;
+  lens.fy = 3310.0;
+  lens.cx = 325.0;
+  lens.cy = 236.0;
+  lens.distortion = {0.8, 0.0, 4e-4, -3e-4, 0.0};
+  lens.camera_from_sample = look_at(target + way * 300.0, target, {0.0, 1.0, 0.0});
+  return lens;
 }
 
 Result<void> validate(const CameraOptics& o) {
@@ -125,6 +101,12 @@ Result<void> validate(const ProjectorOptics& o) {
   OptionsCheck check;
   check.within("width", o.width, 1, 8192).within("height", o.height, 1, 8192);
   check.above("mm_per_pixel", o.mm_per_pixel, 0.0);
+  if (o.kind == ProjectorKind::kPerspective) {
+    check.above("lens.fx", o.lens.fx, 0.0).above("lens.fy", o.lens.fy, 0.0);
+    check.within("lens.width", o.lens.width, o.width, o.width)
+        .within("lens.height", o.lens.height, o.height, o.height);
+    check.above("reference_distance_mm", o.reference_distance_mm, 0.0);
+  }
   check.within("gamma", o.gamma, 0.1, 10.0);
   check.within("black_level", o.black_level, 0.0, 1.0);
   check_vignetting(check, o.vignetting);
@@ -146,30 +128,6 @@ Image<float> vignetting_map(int width, int height, const std::array<double, 3>& 
     }
   }
   return map;
-}
-
-std::vector<Rgb> patch_irradiance(const ProjectorOptics& options,
-                                  const Block& block,
-                                  Face lit_face,
-                                  int patches_x,
-                                  int patches_y,
-                                  const Image<std::uint8_t>& codes) {
-  const std::array<double, 3> size{block.size().x, block.size().y, block.size().z};
-  const double width_px = size[axis_of(lit_face) == 0 ? 1 : 0] / options.mm_per_pixel / patches_x;
-  const double height_px = size[axis_of(lit_face) == 2 ? 1 : 2] / options.mm_per_pixel / patches_y;
-  const Image<float> light = relative_light(options, codes);
-  std::vector<Rgb> patches;
-  for (int row = 0; row < patches_y; ++row) {
-    const double top = options.offset_y_px + row * height_px;
-    const Coverage rows = coverage(top, top + height_px, codes.height());
-    for (int column = 0; column < patches_x; ++column) {
-      const double left = options.offset_x_px + column * width_px;
-      Rgb mean = sum_over(light, coverage(left, left + width_px, codes.width()), rows);
-      for (int c = 0; c < 3; ++c) mean[c] *= options.peak_irradiance[c] / (width_px * height_px);
-      patches.push_back(mean);
-    }
-  }
-  return patches;
 }
 
 Rgb wheel_lit_seconds(double turn_seconds, double from_seconds, double to_seconds) {

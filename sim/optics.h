@@ -53,19 +53,34 @@ struct CameraOptics {
 };
 Result<void> validate(const CameraOptics& options);
 
-/// What the simulated projector does with a picture: its light falls perpendicular on the lit face,
+/// The demo's projector beside its camera: 300 mm from the middle of the face z_max of a 24 x 24 x 6 mm block, 8 degrees off its normal,
+/// with pixels of 0.09 mm there.
+CameraModel demo_projector_lens();
+
+/// How the simulated projector's light reaches the lit face.
+enum class ProjectorKind : std::uint8_t { kPerpendicular, kPerspective };
+
+/// What the simulated projector does with a picture. With light = (1 + v0 r^2 + v1 r^4 + v2 r^6) (black_level + (1 - black_level)
+/// (code/255)^gamma), a perpendicular one sends parallel light,
 ///
-///   irradiance = peak (1 + v0 r^2 + v1 r^4 + v2 r^6) (black_level + (1 - black_level) (code/255)^gamma)
+///   irradiance = peak light
 ///
-/// at (column mm, row mm) = (x - offset_x_px, y - offset_y_px) mm_per_pixel of that face's raster
-/// (see Block). A colour wheel lights one channel after the other, each for a third of a turn at
+/// at (column mm, row mm) = (x - offset_x_px, y - offset_y_px) mm_per_pixel of the lit face's raster (see Block); one in perspective shines
+/// through its lens, an inverse camera, from where that stands,
+///
+///   irradiance = peak light (reference_distance / d)^2 cos(theta)
+///
+/// at a distance d from it and an angle theta to the normal. A colour wheel lights one channel after the other, each for a third of a turn at
 /// three times the power: only exposures of whole turns see every channel alike.
 struct ProjectorOptics {
+  ProjectorKind kind = ProjectorKind::kPerpendicular;
   int width = 640;
   int height = 480;
   double mm_per_pixel = 0.05;
   double offset_x_px = 80.0;
   double offset_y_px = 0.0;
+  CameraModel lens = demo_projector_lens();  ///< of kPerspective; as large as the picture
+  double reference_distance_mm = 300.0;      ///< at which its peak holds
   double gamma = 2.2;
   double black_level = 0.001;  ///< light at code 0, as a fraction of the peak
   std::array<double, 3> vignetting{
@@ -83,16 +98,6 @@ std::array<float, 256> light_of_codes(const ProjectorOptics& options);
 
 /// 1 + v0 r^2 + v1 r^4 + v2 r^6 at each pixel of a picture, 1 channel.
 Image<float> vignetting_map(int width, int height, const std::array<double, 3>& coefficients);
-
-/// Mean irradiance of each patch of the lit face (patches_x x patches_y equal rectangles, column
-/// fastest) under a picture, W/mm^2: pixels count by the area they share with the patch; beside the
-/// projector's field it is dark.
-std::vector<Rgb> patch_irradiance(const ProjectorOptics& options,
-                                  const Block& block,
-                                  Face lit_face,
-                                  int patches_x,
-                                  int patches_y,
-                                  const Image<std::uint8_t>& codes);
 
 /// How long, weighted by power, the wheel lights each channel between two times since a turn began;
 /// both seconds. Over whole turns it is the time itself.

@@ -175,11 +175,19 @@ StationOptics::StationOptics(const CameraOptics& camera,
                              const ProjectorOptics& projector,
                              std::shared_ptr<const TransportResponses> responses,
                              const SurfaceOptions& surface)
-    : camera_(camera), projector_(projector), responses_(std::move(responses)) {
+    : camera_(camera),
+      responses_(std::move(responses)),
+      patches_(projector,
+               responses_->block,
+               responses_->lit_face,
+               responses_->patches_x,
+               responses_->patches_y) {
   const Block& block = responses_->block;
   const Face face = responses_->seen_face;
-  if (face == responses_->lit_face && surface.reflectance > 0.0)
+  if (face == responses_->lit_face && surface.reflectance > 0.0) {
     reflectance_ = surface_reflectance(surface, block, face);
+    cells_.emplace(projector, block, face, block.face_width(face), block.face_height(face));
+  }
   const FaceView view(camera.model, block, face);
   auto above = corner_row(view, camera.model.width, 0);
   for (int y = 0; y < camera.model.height; ++y) {
@@ -200,12 +208,7 @@ StationOptics::StationOptics(const CameraOptics& camera,
 
 StationLight StationOptics::light(const Image<std::uint8_t>& codes) const {
   StationLight light;
-  light.patch_irradiance = patch_irradiance(projector_,
-                                            responses_->block,
-                                            responses_->lit_face,
-                                            responses_->patches_x,
-                                            responses_->patches_y,
-                                            codes);
+  light.patch_irradiance = patches_.irradiance(codes);
   light.surface_radiance = surface(light.patch_irradiance);
   if (!reflectance_.empty()) reflect(codes, light.surface_radiance);
   light.sensor_radiance = blurred(seen(light.surface_radiance), camera_.psf_sigma_px);
@@ -234,12 +237,7 @@ Image<float> StationOptics::surface(const std::vector<Rgb>& patch_irradiance) co
 }
 
 void StationOptics::reflect(const Image<std::uint8_t>& codes, Image<float>& radiance) const {
-  const std::vector<Rgb> irradiance = patch_irradiance(projector_,
-                                                       responses_->block,
-                                                       responses_->lit_face,
-                                                       radiance.width(),
-                                                       radiance.height(),
-                                                       codes);
+  const std::vector<Rgb> irradiance = cells_->irradiance(codes);
   const std::span<const float> reflectance = reflectance_.samples();
   for (std::size_t i = 0; i < reflectance.size(); ++i)
     radiance.samples()[i] += static_cast<float>(irradiance[i / 3][i % 3]) * reflectance[i];

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
 #include "base/transport_responses.h"
+#include "sim/lit_face.h"
 #include "sim/optics.h"
 #include "sim/surface_reflectance.h"
 
@@ -66,8 +68,9 @@ class StationOptics : public LightPath {
     float weight;        ///< of the pixel's area
   };
   CameraOptics camera_;
-  ProjectorOptics projector_;
   std::shared_ptr<const TransportResponses> responses_;
+  LitFace patches_;
+  std::optional<LitFace> cells_;            ///< of the lit face, where its surface reflects
   Image<float> reflectance_;                ///< of the seen face's surface; empty: none
   std::vector<std::uint32_t> first_share_;  ///< per pixel, and one behind the last
   std::vector<Share> shares_;

@@ -160,12 +160,8 @@ TEST(ProjectorOptics, GammaAndBlackLevelGiveThePatchItsIrradiance) {
   RigOptions options = support::tiny_rig();
   options.projector.vignetting = {};
   const auto irradiance = [&](std::uint8_t code) {
-    return patch_irradiance(options.projector,
-                            support::tiny_responses()->block,
-                            Face::kZMin,
-                            4,
-                            4,
-                            support::flat_pattern(options, 1, code).codes)[5][1];
+    return LitFace(options.projector, support::tiny_responses()->block, Face::kZMin, 4, 4)
+        .irradiance(support::flat_pattern(options, 1, code).codes)[5][1];
   };
   // Single precision inside.
   EXPECT_NEAR(irradiance(255), 1e-3, 1e-9);
@@ -182,8 +178,9 @@ TEST(ProjectorOptics, APatchHalfCoveredGetsHalfTheLight) {
     for (int x = 20; x < 35; ++x) pattern.codes.at(x, y, 0) = 255;  // 1.5 of 4 patches of 10 pixels
   }
   options.projector.offset_x_px = 20.25;  // a quarter of a pixel to the side
-  const auto patches = patch_irradiance(
-      options.projector, support::tiny_responses()->block, Face::kZMin, 4, 4, pattern.codes);
+  const auto patches =
+      LitFace(options.projector, support::tiny_responses()->block, Face::kZMin, 4, 4)
+          .irradiance(pattern.codes);
   EXPECT_NEAR(patches[0][0], 1e-3, 1e-9);
   EXPECT_NEAR(patches[1][0], 0.475e-3, 1e-9);
   EXPECT_NEAR(patches[2][0], 0.0, 1e-12);
@@ -194,14 +191,80 @@ TEST(ProjectorOptics, BesideTheFieldItIsDark) {
   RigOptions options = support::tiny_rig();
   options.projector.vignetting = {};
   options.projector.offset_x_px = -10.0;  // the first patch lies outside
-  const auto patches = patch_irradiance(options.projector,
-                                        support::tiny_responses()->block,
-                                        Face::kZMin,
-                                        4,
-                                        4,
-                                        support::flat_pattern(options, 1, 255).codes);
+  const auto patches =
+      LitFace(options.projector, support::tiny_responses()->block, Face::kZMin, 4, 4)
+          .irradiance(support::flat_pattern(options, 1, 255).codes);
   EXPECT_EQ(patches[0][0], 0.0);
   EXPECT_NEAR(patches[1][0], 1e-3, 1e-9);
+}
+
+// 8 x 8 mm of a face, lit from 200 mm away at 30 degrees by a lens without distortion: by the definition, at a rectangle's middle. A
+// rectangle is 2 mm, so its mean is within (1 / 200)^2 of that.
+TEST(ProjectorOptics, InPerspectiveLightFallsOffWithDistanceAndAngle) {
+  RigOptions options = support::tiny_rig();
+  const Block block = support::tiny_responses()->block;
+  ProjectorOptics& p = options.projector;
+  p.kind = ProjectorKind::kPerspective;
+  p.vignetting = {};
+  p.lens = {.width = 80,
+            .height = 60,
+            .fx = 1000.0,
+            .fy = 1000.0,
+            .cx = 41.0,
+            .cy = 29.0,
+            .camera_from_sample = {}};
+  const Vec3 lamp{4.0 + 100.0, 4.0, -173.2};
+  p.lens.camera_from_sample = look_at(lamp, {4.0, 4.0, 0.0}, {0.0, 1.0, 0.0});
+  p.reference_distance_mm = 150.0;
+  const auto lit =
+      LitFace(p, block, Face::kZMin, 4, 4).irradiance(support::flat_pattern(options, 1, 255).codes);
+  for (int i = 0; i < 16; ++i) {
+    const Vec3 way = lamp - Vec3{2.0 * (i % 4) + 1.0, 2.0 * (i / 4) + 1.0, 0.0};
+    const double expected = 1e-3 * 150.0 * 150.0 / dot(way, way) * -way.z / length(way);
+    EXPECT_NEAR(lit[static_cast<std::size_t>(i)][1], expected, 5e-5 * expected) << i;
+  }
+  const auto behind =
+      LitFace(p, block, Face::kZMax, 4, 4).irradiance(support::flat_pattern(options, 1, 255).codes);
+  EXPECT_EQ(behind[5][1], 0.0);
+}
+
+// What one pixel lights lies where the inverse of its lens says, distortion and all: the middle of its light, by rectangles of a quarter of a
+// pixel, is its ray's place.
+TEST(ProjectorOptics, InPerspectiveAPixelLightsWhereItsRayFalls) {
+  RigOptions options = support::tiny_rig();
+  const Block block = support::tiny_responses()->block;
+  ProjectorOptics& p = options.projector;
+  p.kind = ProjectorKind::kPerspective;
+  p.lens = {.width = 80,
+            .height = 60,
+            .fx = 1000.0,
+            .fy = 1000.0,
+            .cx = 41.0,
+            .cy = 29.0,
+            .camera_from_sample = {}};
+  p.lens.distortion = {20.0, 0.0, 0.01, -0.02, 0.0};
+  p.lens.camera_from_sample = look_at({40.0, -20.0, -190.0}, {4.0, 4.0, 0.0}, {0.0, 1.0, 0.0});
+  p.black_level = 0.0;
+  drivers::Pattern pattern = support::flat_pattern(options, 1, 0);
+  pattern.codes.at(52, 37, 0) = 255;
+  const int n = 160;  // of 0.05 mm
+  const auto lit = LitFace(p, block, Face::kZMin, n, n).irradiance(pattern.codes);
+  double sum = 0.0;
+  double column = 0.0;
+  double row = 0.0;
+  for (int i = 0; i < n * n; ++i) {
+    const double e = lit[static_cast<std::size_t>(i)][0];
+    sum += e;
+    column += e * (i % n + 0.5) * 8.0 / n;
+    row += e * (i / n + 0.5) * 8.0 / n;
+  }
+  const FacePlace place = lit_by(p, block, Face::kZMin, 52.5, 37.5);
+  ASSERT_GT(sum, 0.0);
+  EXPECT_NEAR(column / sum, place.column, 0.01);
+  EXPECT_NEAR(row / sum, place.row, 0.01);
+  const auto seen = p.lens.project({place.column, place.row, 0.0});
+  EXPECT_NEAR(seen.x, 52.5, 1e-6);
+  EXPECT_NEAR(seen.y, 37.5, 1e-6);
 }
 
 TEST(StationLight, AFlatSurfaceIsSeenFlatAndEndsAtTheEdge) {
