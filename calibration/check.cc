@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "calibration/measured_station.h"
 #include "calibration/step.h"
 
 namespace opaline::calibration {

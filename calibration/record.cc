@@ -277,37 +277,4 @@ Result<Record> record_from_text(std::string_view text, const std::string& file) 
   }
 }
 
-capture::StationCalibration with_measured(capture::StationCalibration given,
-                                          const Measured& measured) {
-  capture::CameraCalibration& camera = given.camera;
-  if (measured.black_level) {
-    camera.black_level = *measured.black_level;
-    camera.hot_pixels = measured.hot_pixels;
-  }
-  if (measured.response) camera.response = *measured.response;
-  if (measured.gain_electrons_per_code) {
-    const double gain = *measured.gain_electrons_per_code;
-    for (double& s : camera.sensitivity) s *= gain / camera.gain_electrons_per_code;
-    camera.gain_electrons_per_code = gain;
-  }
-  camera.exposure_factors = measured.exposure_factors;
-  if (measured.read_noise_electrons) camera.read_noise_electrons = *measured.read_noise_electrons;
-  if (measured.clipping_code) {
-    camera.full_well_electrons = 0.0;
-    if (*measured.clipping_code < camera.max_code())
-      camera.full_well_electrons =
-          capture::electrons_from_code(camera, *measured.clipping_code).signal;
-  }
-  if (measured.camera_lens) {
-    const Pose place = camera.model.camera_from_sample;
-    camera.model = measured.camera_lens->model;
-    camera.model.camera_from_sample = place;
-  }
-  if (measured.projector_gamma) given.projector.gamma = *measured.projector_gamma;
-  if (measured.projector_black) given.projector.black_level = *measured.projector_black;
-  if (measured.camera_vignetting) camera.vignetting = *measured.camera_vignetting;
-  if (measured.projector_vignetting) given.projector.vignetting = *measured.projector_vignetting;
-  return given;
-}
-
 }  // namespace opaline::calibration

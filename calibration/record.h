@@ -113,10 +113,4 @@ std::string to_text(const Record& record);
 /// Errors: kInvalidArgument for what is damaged, saying where, or written by a newer version.
 Result<Record> record_from_text(std::string_view text, const std::string& file);
 
-/// What a capture should believe: `given`, with the camera's black level, response, clipping, gain, read noise, exposure times, hot pixels,
-/// vignetting and lens, and the projector's gamma, black level and vignetting, as measured; the camera's place stays as given. The sensitivity follows the gain, so that codes per radiance, which is what the one
-/// who gave it had measured, stay as given.
-capture::StationCalibration with_measured(capture::StationCalibration given,
-                                          const Measured& measured);
-
 }  // namespace opaline::calibration

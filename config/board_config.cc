@@ -69,15 +69,8 @@ void visit_sim_board(Fields& fields, SimBoardConfig& board) {
                   board.hidden,
                   0,
                   Range::between(1, kMostPoses.max));
-  fields.table({"projector_lens", "The projector's lens, as an inverse camera."}, [&](Fields& f) {
-    CameraModel& lens = board.projector;
-    f.number({"fx", "focal length, its pixels"}, lens.fx, Range::above(0.0));
-    f.number({"fy", "the same"}, lens.fy, Range::above(0.0));
-    f.number({"cx", "principal point, its pixels"}, lens.cx);
-    f.number({"cy", "the same"}, lens.cy);
-    f.numbers({"distortion", "k1 k2 p1 p2 k3"}, lens.distortion);
-    visit_pose(f, lens.camera_from_sample);
-  });
+  fields.table({"projector_lens", "The lens of a projector that is not in perspective otherwise."},
+               [&](Fields& f) { visit_projector_lens(f, board.projector); });
 }
 
 void visit_holder(Fields& fields, calibration::HolderOptions& holder) {
@@ -116,10 +109,12 @@ calibration::HolderOptions holder_of(const SimHolderConfig& holder) {
 sim::BoardSceneOptions board_scene(const SimBoardConfig& board, const sim::RigOptions& rig) {
   sim::BoardSceneOptions scene;
   scene.board = board.board;
-  scene.projector = board.projector;
+  const bool has_lens = rig.projector.kind == sim::ProjectorKind::kPerspective;
+  scene.projector = has_lens ? rig.projector.lens : board.projector;
   scene.projector.width = rig.projector.width;
   scene.projector.height = rig.projector.height;
-  scene.reference_distance_mm = scene.focus_mm = board.distance_mm;
+  scene.focus_mm = board.distance_mm;
+  scene.reference_distance_mm = has_lens ? rig.projector.reference_distance_mm : board.distance_mm;
   scene.poses = sim::held_poses(
       scene.board, rig.camera.model, scene.projector, board.distance_mm, board.poses, board.seed);
   const auto last = static_cast<std::int64_t>(scene.poses.size());

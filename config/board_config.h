@@ -28,7 +28,7 @@ struct SimBoardConfig {
   double distance_mm = 350.0;           ///< from the camera, about
   std::vector<std::int64_t> defocused;  ///< poses, counted from 1, out of focus by 2.5 px
   std::vector<std::int64_t> hidden;     ///< poses in which a hand covers a third of it
-  /// Of the projector; its size is that of the simulated one.
+  /// Of a projector whose kind is perpendicular; its size is that of the simulated one.
   CameraModel projector = sim::board_projector(640, 480);
 
   bool is_there() const { return kind != calibration::Board::Kind::kNone; }

@@ -34,4 +34,13 @@ void visit_pose(Fields& fields, Pose& pose, std::string_view from, std::string_v
   pose.translation = {t[0], t[1], t[2]};
 }
 
+void visit_projector_lens(Fields& fields, CameraModel& lens) {
+  fields.number({"fx", "focal length, its pixels"}, lens.fx, Range::above(0.0));
+  fields.number({"fy", "the same"}, lens.fy, Range::above(0.0));
+  fields.number({"cx", "principal point, its pixels"}, lens.cx);
+  fields.number({"cy", "the same"}, lens.cy);
+  fields.numbers({"distortion", "k1 k2 p1 p2 k3"}, lens.distortion);
+  visit_pose(fields, lens.camera_from_sample, "sample", "projector");
+}
+
 }  // namespace opaline::config

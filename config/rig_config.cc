@@ -17,6 +17,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kSceneNames{
     "homogeneous", "layered", "wax", "marble", "stone"};
 constexpr std::array<std::string_view, 3> kResponseNames{"linear", "gamma", "table"};
+constexpr std::array<std::string_view, 2> kProjectorKindNames{"perpendicular", "perspective"};
 constexpr Range kAtLeast0 = Range{.min = 0.0};
 constexpr Range kAbove0 = Range{.min = 0.0, .min_excluded = true};
 constexpr Range kPictureSize = Range{.min = 1, .max = 8192};
@@ -42,11 +43,15 @@ void visit_projector_size(Fields& fields, int& width, int& height) {
 /// What the simulated projector and its calibration both have.
 template <class Projector>
 void visit_projection(Fields& fields, Projector& p) {
+  fields.one_of(
+      {"kind", "parallel light, or by its lens from where it stands"}, p.kind, kProjectorKindNames);
   visit_projector_size(fields, p.width, p.height);
   fields.number({"mm_per_pixel", "of the picture on the lit face"}, p.mm_per_pixel, kAbove0);
   fields.number({"offset_x_px", "pixel at which the lit face's first column begins"},
                 p.offset_x_px);
   fields.number({"offset_y_px", "pixel at which its first row begins"}, p.offset_y_px);
+  fields.length_mm({"reference_distance", "at which the peak holds, in perspective"},
+                   p.reference_distance_mm);
   fields.number({"gamma", "light = (code / 255)^gamma"}, p.gamma, kGamma);
   fields.number({"black_level", "light at code 0, share of the peak"},
                 p.black_level,
@@ -54,6 +59,16 @@ void visit_projection(Fields& fields, Projector& p) {
   fields.numbers({"peak_irradiance_w_per_mm2", "red, green, blue, at code 255 in the middle"},
                  p.peak_irradiance,
                  kAbove0);
+}
+
+template <class Projector>
+void visit_lens_of(Fields& fields, Projector& p) {
+  fields.table({"lens", "Its lens, as an inverse camera, when kind = \"perspective\"."},
+               [&](Fields& f) {
+                 visit_projector_lens(f, p.lens);
+                 p.lens.width = p.width;
+                 p.lens.height = p.height;
+               });
 }
 
 constexpr Key kVignetting{"vignetting",
@@ -101,6 +116,7 @@ void visit_sim_projector(Fields& fields, sim::ProjectorOptics& p) {
   fields.duration({"wheel_turn", "of the colour wheel: exposures are whole multiples"},
                   p.wheel_turn,
                   Range::between(1e-6, 1));
+  visit_lens_of(fields, p);
 }
 
 void visit_surface(Fields& fields, sim::SurfaceOptions& surface) {
@@ -197,6 +213,11 @@ capture::StationCalibration truth_of(const sim::RigOptions& rig) {
   camera.vignetting.coefficients = rig.camera.vignetting;
   camera.sensitivity = rig.camera.sensitivity;
   capture::ProjectorCalibration& projector = calibration.projector;
+  projector.kind = rig.projector.kind == sim::ProjectorKind::kPerspective
+                       ? capture::ProjectorKind::kPerspective
+                       : capture::ProjectorKind::kPerpendicular;
+  projector.lens = rig.projector.lens;
+  projector.reference_distance_mm = rig.projector.reference_distance_mm;
   projector.width = rig.projector.width;
   projector.height = rig.projector.height;
   projector.mm_per_pixel = rig.projector.mm_per_pixel;
@@ -298,22 +319,21 @@ void visit_calibration(Fields& fields, RigConfig& rig) {
                     real.model.height,
                     real.bit_depth));
   });
-  fields.table(
-      {"projector", "The projector; its light falls perpendicular on the lit face."},
-      [&](Fields& f) {
-        capture::ProjectorCalibration& p = rig.calibration.projector;
-        visit_projection(f, p);
-        visit_vignetting(f, p.vignetting.coefficients);
-        const sim::ProjectorOptics& real = rig.sim.rig.projector;
-        f.check(rig.projector != Driver::kSim || (p.width == real.width && p.height == real.height),
-                "width",
-                fmt::format("the picture has {} x {} pixels; expected the simulated "
-                            "projector's {} x {}",
-                            p.width,
-                            p.height,
-                            real.width,
-                            real.height));
-      });
+  fields.table({"projector", "The projector."}, [&](Fields& f) {
+    capture::ProjectorCalibration& p = rig.calibration.projector;
+    visit_projection(f, p);
+    visit_vignetting(f, p.vignetting.coefficients);
+    const sim::ProjectorOptics& real = rig.sim.rig.projector;
+    f.check(rig.projector != Driver::kSim || (p.width == real.width && p.height == real.height),
+            "width",
+            fmt::format("the picture has {} x {} pixels; expected the simulated "
+                        "projector's {} x {}",
+                        p.width,
+                        p.height,
+                        real.width,
+                        real.height));
+    visit_lens_of(f, p);
+  });
 }
 
 }  // namespace

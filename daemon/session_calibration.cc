@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calibration/frame_taker.h"
+#include "calibration/measured_station.h"
 #include "calibration/procedure.h"
 #include "calibration/sample_finder.h"
 #include "calibration/store.h"
@@ -189,8 +190,12 @@ Result<capture::StationCalibration> session_calibration(const SessionDirectory& 
       own_placement(session, rig, *calibration, station, files, events, std::move(stop));
   if (!placement) return placement.error();
   if (*placement) {
-    calibration->camera.model.camera_from_sample = (*placement)->camera_from_sample;
-    calibration->camera.place_covariance = (*placement)->covariance;
+    const auto record = record_of(session);
+    if (!record) return record.error();
+    *calibration = calibration::with_place(*std::move(calibration),
+                                           record->measured,
+                                           (*placement)->camera_from_sample,
+                                           (*placement)->covariance);
   }
   if (!(calibration->camera.model == rig.calibration.camera.model)) {
     if (auto kept = keep_camera(session, files, calibration->camera.model); !kept)

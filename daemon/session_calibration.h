@@ -20,6 +20,8 @@ namespace opaline::daemon {
 /// Where the rig file has a holder, and calibrations are used at all, the camera's place before the sample, with its covariance, is by that
 /// (calibration::find_sample), measured at the same moment and kept in SESSION/calibration/placement.json.
 ///
+/// A projector in perspective that was measured goes with the camera (calibration::with_place).
+///
 /// Camera lens and place that come out of it are kept for those who draw (session_camera.h).
 ///
 /// Facts: calibration.used {version, created, message}, calibration.warning {message} for each doubt, placement.measured {corners,

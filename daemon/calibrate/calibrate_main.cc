@@ -16,6 +16,7 @@
 #include "base/clock.h"
 #include "base/files.h"
 #include "base/io/image_io.h"
+#include "calibration/measured_station.h"
 #include "calibration/procedure.h"
 #include "calibration/store.h"
 #include "config/session_config.h"

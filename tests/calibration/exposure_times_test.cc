@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "calibration/measured_station.h"
 #include "calibration/record.h"
 #include "capture/region_taker.h"
 #include "sim/sensor.h"

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "base/clock.h"
+#include "calibration/measured_station.h"
 #include "calibration/procedure.h"
 #include "sim/board_optics.h"
 #include "sim/rig.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/clock.h"
+#include "calibration/measured_station.h"
 #include "calibration/response_fit.h"
 #include "sim/rig.h"
 #include "sim/sim_camera.h"
