@@ -35,8 +35,8 @@ void visit_pose(Fields& fields, Pose& pose, std::string_view from, std::string_v
 }
 
 void visit_projector_lens(Fields& fields, CameraModel& lens) {
-  fields.number({"fx", "focal length, its pixels"}, lens.fx, Range::above(0.0));
-  fields.number({"fy", "the same"}, lens.fy, Range::above(0.0));
+  fields.number({"fx", "focal length, its pixels"}, lens.fx, Range::at_least(0.0));
+  fields.number({"fy", "the same"}, lens.fy, Range::at_least(0.0));
   fields.number({"cx", "principal point, its pixels"}, lens.cx);
   fields.number({"cy", "the same"}, lens.cy);
   fields.numbers({"distortion", "k1 k2 p1 p2 k3"}, lens.distortion);

@@ -63,12 +63,15 @@ void visit_projection(Fields& fields, Projector& p) {
 
 template <class Projector>
 void visit_lens_of(Fields& fields, Projector& p) {
-  fields.table({"lens", "Its lens, as an inverse camera, when kind = \"perspective\"."},
-               [&](Fields& f) {
-                 visit_projector_lens(f, p.lens);
-                 p.lens.width = p.width;
-                 p.lens.height = p.height;
-               });
+  fields.table(
+      {"lens", "Its lens, as an inverse camera, when kind = \"perspective\"."}, [&](Fields& f) {
+        visit_projector_lens(f, p.lens);
+        f.check(p.kind != decltype(p.kind)::kPerspective || (p.lens.fx > 0.0 && p.lens.fy > 0.0),
+                "fx",
+                "expected the focal lengths of a projector in perspective");
+        p.lens.width = p.width;
+        p.lens.height = p.height;
+      });
 }
 
 constexpr Key kVignetting{"vignetting",
