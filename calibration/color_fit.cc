@@ -12,14 +12,9 @@ constexpr double kSlopeStep = 1e-6;
 
 int term_count(ColorModel model) { return model == ColorModel::kMatrix ? 3 : 6; }
 
-Eigen::VectorXd color_terms(ColorModel model, const CameraRgb& balance, const CameraRgb& rgb) {
-  std::array<double, 3> v{};
-  for (std::size_t c = 0; c < 3; ++c) v[c] = std::max(0.0, rgb[c] * balance[c]);
-  Eigen::VectorXd terms(term_count(model));
-  terms.head<3>() << v[0], v[1], v[2];
-  if (model == ColorModel::kRootPolynomial)
-    terms.tail<3>() << std::sqrt(v[0] * v[1]), std::sqrt(v[1] * v[2]), std::sqrt(v[2] * v[0]);
-  return terms;
+Eigen::VectorXd terms_of(ColorModel model, const CameraRgb& balance, const CameraRgb& rgb) {
+  const std::vector<double> terms = color_terms(model, balance, rgb);
+  return Eigen::Map<const Eigen::VectorXd>(terms.data(), static_cast<Eigen::Index>(terms.size()));
 }
 
 Xyz xyz_of(const Eigen::MatrixXd& m, const Eigen::VectorXd& terms) {
@@ -97,12 +92,10 @@ std::array<double, 3> shares(const std::array<double, 3>& v) {
                    : std::array<double, 3>{};
 }
 
-// Linear red, green and blue of ITU-R BT.709, adapted to D50 (Bradford).
 std::array<double, 3> rgb_of(const Lab& lab) {
-  const Xyz v = xyz_from_lab(lab);
-  return {std::max(0.0, 3.1338561 * v[0] - 1.6168667 * v[1] - 0.4906146 * v[2]),
-          std::max(0.0, -0.9787684 * v[0] + 1.9161415 * v[1] + 0.0334540 * v[2]),
-          std::max(0.0, 0.0719453 * v[0] - 0.2289914 * v[1] + 1.4052427 * v[2])};
+  std::array<double, 3> rgb = linear_srgb(xyz_from_lab(lab));
+  for (double& v : rgb) v = std::max(0.0, v);
+  return rgb;
 }
 
 double quantile_of_sorted(const std::vector<double>& sorted, double share) {
@@ -120,16 +113,6 @@ std::vector<T> without(std::span<const T> all, std::size_t left_out) {
 }
 
 }  // namespace
-
-std::string_view to_string(ColorModel model) {
-  return model == ColorModel::kMatrix ? "matrix" : "root_polynomial";
-}
-
-Xyz ColorCorrection::xyz(const CameraRgb& rgb) const {
-  const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>> m(
-      coefficients.data(), 3, term_count(model));
-  return xyz_of(m, color_terms(model, white_balance, rgb));
-}
 
 Result<CameraRgb> balance_white(const CameraRgb& white) {
   const double least = std::ranges::min(white);
@@ -149,7 +132,7 @@ Result<ColorCorrection> fit_color(ColorModel model,
   Eigen::MatrixXd a(patches.size(), n);
   Eigen::MatrixXd b(patches.size(), 3);
   for (std::size_t p = 0; p < patches.size(); ++p) {
-    terms.push_back(color_terms(model, white_balance, patches[p]));
+    terms.push_back(terms_of(model, white_balance, patches[p]));
     const Xyz xyz = xyz_from_lab(references[p]);
     a.row(static_cast<Eigen::Index>(p)) = terms.back().transpose();
     b.row(static_cast<Eigen::Index>(p)) << xyz[0], xyz[1], xyz[2];

@@ -9,7 +9,7 @@
 
 #include "base/camera_model.h"
 #include "base/result.h"
-#include "calibration/color_fit.h"
+#include "calibration/color_correction.h"
 #include "capture/calibration.h"
 
 namespace opaline::calibration {

@@ -71,6 +71,8 @@ std::vector<std::pair<std::string, std::string>> assumptions(const ReportData& d
                                                                        : "total variation",
                    options.regularization)},
       {"Calibration", calibration(data)},
+      {"Colours of the pictures",
+       data.colors ? "sRGB, by the " + data.colors->name() : "the camera's own, not corrected"},
       {"Unscattered light", "left out: it is not part of the diffuse light"},
   };
 }

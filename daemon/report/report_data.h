@@ -13,6 +13,7 @@
 #include "daemon/report/error_sums.h"
 #include "daemon/report/hdr_picture.h"
 #include "daemon/report/relighting.h"
+#include "daemon/report/shown_colors.h"
 #include "daemon/report/stage_times.h"
 #include "daemon/report/surface_view.h"
 
@@ -53,11 +54,16 @@ struct ReportData {
   std::optional<ChannelErrors> bssrdf;
   std::string bssrdf_absent;  ///< why there is no BSSRDF error
   SessionFacts facts;
+  std::optional<ShownColors> colors;  ///< none: pictures are in the camera's own
   std::string solver;
   std::string renderer;
-  double white = 1.0;       ///< radiance shown as white
+  double white = 1.0;       ///< shown as white
   double difference = 0.1;  ///< share of white at the ends of the difference pictures' scale
 
+  /// Radiance as its pictures are drawn from: corrected, where there is a correction.
+  Image<float> shown(const Image<float>& radiance) const {
+    return colors ? colors->apply(radiance) : radiance;
+  }
   /// Over all held-out lights.
   ChannelErrors relighting() const {
     ChannelErrors sum;

@@ -66,8 +66,8 @@ class Page {
 void add_trio(const RelitLight& light, const ReportData& data, Page& page) {
   const ErrorSums sums = light.errors.all();
   page.add("<div class=\"trio\">\n");
-  page.add_picture(tone_mapped(light.captured, data.white), light.name + ", captured");
-  page.add_picture(tone_mapped(light.relit, data.white), "relit");
+  page.add_picture(tone_mapped(data.shown(light.captured), data.white), light.name + ", captured");
+  page.add_picture(tone_mapped(data.shown(light.relit), data.white), "relit");
   page.add_picture(
       difference_picture(light.relit, light.captured, light.counts, data.difference * data.white),
       fmt::format(
@@ -197,7 +197,8 @@ void add_capture(const ReportData& data, Page& page) {
   }
   page.add("<div class=\"sheet\">\n");
   for (const ContactPicture& contact : data.contacts) {
-    auto picture = tone_mapped(contact.radiance, white_point(contact.radiance, 0.998));
+    const Image<float> shown = data.shown(contact.radiance);
+    auto picture = tone_mapped(shown, white_point(shown, 0.998));
     mark(picture, contact.saturated);
     const std::string saturated =
         contact.saturated_share > 0.0
@@ -214,7 +215,7 @@ std::string triple(const std::array<double, 3>& values, std::string_view unit, d
       "{:.3g}, {:.3g}, {:.3g} {}", scale * values[0], scale * values[1], scale * values[2], unit);
 }
 
-void add_surface(const SurfaceView& view, Page& page) {
+void add_surface(const ReportData& data, const SurfaceView& view, Page& page) {
   page.begin("surface", "What the surface reflects by itself");
   page.add(
       html::paragraph("The whole face lit at once: what the camera saw, what the material explains "
@@ -222,11 +223,11 @@ void add_surface(const SurfaceView& view, Page& page) {
                       "with the surface's own reflection, ρₛ = (L − L_material) / E. It holds for "
                       "this direction of light and view; "
                       "surface_reflectance.exr has it."));
-  const double white = white_point(view.captured, 0.998);
+  const double white = white_point(data.shown(view.captured), 0.998);
   page.add("<div class=\"trio\">\n");
-  page.add_picture(tone_mapped(view.captured, white), "captured");
-  page.add_picture(tone_mapped(view.material, white), "the material alone");
-  page.add_picture(tone_mapped(view.relit, white), "with its surface");
+  page.add_picture(tone_mapped(data.shown(view.captured), white), "captured");
+  page.add_picture(tone_mapped(data.shown(view.material), white), "the material alone");
+  page.add_picture(tone_mapped(data.shown(view.relit), white), "with its surface");
   page.add("</div>\n");
   const Image<float>& rho = view.surface.reflectance;
   const double brightest = white_point(rho, 0.998);
@@ -361,7 +362,7 @@ Result<std::string> report_page(const ReportData& data) {
   if (!data.lights.empty()) add_trio(showpiece(data), data, page);
   add_relighting(data, page);
   add_capture(data, page);
-  if (data.surface) add_surface(*data.surface, page);
+  if (data.surface) add_surface(data, *data.surface, page);
   add_fit(data, page);
   add_model(data, page);
   add_convergence(data, page);

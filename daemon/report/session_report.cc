@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <iterator>
+#include <optional>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "base/clock.h"
@@ -17,6 +20,7 @@
 #include "base/io/surface_io.h"
 #include "base/io/transport_io.h"
 #include "base/io/volume_io.h"
+#include "calibration/record.h"
 #include "daemon/jobs/version.h"
 #include "daemon/report/bssrdf.h"
 #include "daemon/report/found_source.h"
@@ -41,6 +45,26 @@ using reconstruct::diffusion::FluenceSolver;
 constexpr int kContactPixels = 128;
 constexpr std::size_t kLightsAtATime = 8;  // a batch for the solver; between two, progress
 
+/// Of the calibration that the session took over; none where it has none, or no chart was measured.
+Result<std::optional<ShownColors>> colors_of(const SessionDirectory& session,
+                                             const capture::CameraCalibration& camera) {
+  std::error_code none;
+  if (!std::filesystem::exists(session.calibration(), none)) return std::nullopt;
+  const auto text = read_text(session.calibration());
+  if (!text) return text.error();
+  const auto record = calibration::record_from_text(*text, session.calibration().string());
+  if (!record) return record.error();
+  const auto& color = record->measured.color;
+  if (!color) return std::nullopt;
+  const bool is_matrix = color->model == calibration::ColorModel::kMatrix;
+  return ShownColors(*color,
+                     camera.sensitivity,
+                     fmt::format("{} of calibration {} of {}",
+                                 is_matrix ? "3 x 3 matrix" : "root polynomials",
+                                 record->version,
+                                 record->created));
+}
+
 /// The session's files, read.
 Result<ReportData> read_session(const SessionDirectory& session) {
   auto config = config::load_resolved(session);
@@ -56,7 +80,10 @@ Result<ReportData> read_session(const SessionDirectory& session) {
   }
   const auto text = read_text(session.reconstruction());
   if (!text) return text.error();
+  auto colors = colors_of(session, config->rig.calibration.camera);
+  if (!colors) return colors.error();
   ReportData data;
+  data.colors = *std::move(colors);
   data.session_id = session.id();
   data.generator = fmt::format("opaline-preview {}", version());
   data.config = *std::move(config);
@@ -171,7 +198,8 @@ Result<void> SessionReport::compare_all(render::Renderer& renderer) {
   }
   double white = 0.0;
   for (const RelitLight& light : data_.lights) {
-    white = std::max(white, white_point(light.captured, data_.config.preview.white_quantile));
+    white = std::max(white,
+                     white_point(data_.shown(light.captured), data_.config.preview.white_quantile));
   }
   data_.white = white > 0.0 ? white : 1.0;
   double difference = 0.0;
@@ -224,12 +252,12 @@ Result<void> SessionReport::look_at_surface(render::Renderer& renderer) {
 
 Result<void> SessionReport::write_surface_pictures(const SurfaceView& view) {
   if (auto made = job_.files.make_directories(job_.session.preview()); !made) return made;
-  const double white = white_point(view.captured, data_.config.preview.white_quantile);
+  const double white = white_point(data_.shown(view.captured), data_.config.preview.white_quantile);
   for (const auto& [kind, picture] : {std::pair{"captured", &view.captured},
                                       std::pair{"relit", &view.relit},
                                       std::pair{"material", &view.material}}) {
     const std::string name = fmt::format("{}-{}", data_.dataset.uniform->name, kind);
-    const ImageFile png{tone_mapped(*picture, white > 0.0 ? white : 1.0), {}, {}};
+    const ImageFile png{tone_mapped(data_.shown(*picture), white > 0.0 ? white : 1.0), {}, {}};
     if (auto done = write_image(name + ".png", png, ImageFormat::kPng); !done) return done;
     const ImageFile exr{*picture, {}, {{"unit", "W/(mm^2 sr)"}}};
     if (auto done = write_image(name + ".exr", exr, ImageFormat::kExr); !done) return done;
@@ -291,8 +319,12 @@ Result<void> SessionReport::write_pictures(const RelitLight& light) {
     ImageFormat format = ImageFormat::kPng;
   };
   const std::array outputs{
-      Output{"captured.png", {tone_mapped(light.captured, data_.white), {}, {}}, ImageFormat::kPng},
-      Output{"relit.png", {tone_mapped(light.relit, data_.white), {}, {}}, ImageFormat::kPng},
+      Output{"captured.png",
+             {tone_mapped(data_.shown(light.captured), data_.white), {}, {}},
+             ImageFormat::kPng},
+      Output{"relit.png",
+             {tone_mapped(data_.shown(light.relit), data_.white), {}, {}},
+             ImageFormat::kPng},
       Output{"difference.png",
              {difference_picture(light.relit, light.captured, light.counts, range), {}, {}},
              ImageFormat::kPng},

@@ -14,6 +14,7 @@
 #include "base/io/image_io.h"
 #include "base/io/transport_io.h"
 #include "base/thread_team.h"
+#include "calibration/record.h"
 #include "config/scene_config.h"
 #include "daemon/render/scene_view.h"
 #include "daemon/report/html.h"
@@ -61,6 +62,10 @@ class SessionReportTest : public ::testing::Test {
   nlohmann::json report() {
     const auto session = testing::fabricate_session(this->session(), what_);
     EXPECT_TRUE(session) << session.error().message;
+    if (record_) {
+      EXPECT_TRUE(system_files().make_directories(session->calibration().parent_path()));
+      EXPECT_TRUE(write_whole(system_files(), session->calibration(), to_text(*record_)));
+    }
     JobContext job{*session, progress_, system_files(), {}};
     const auto done = report_session(job, tests::validated());
     EXPECT_TRUE(done) << done.error().message;
@@ -78,6 +83,7 @@ class SessionReportTest : public ::testing::Test {
 
   testing::TemporaryDirectory directory_;
   testing::Fabrication what_;
+  std::optional<calibration::Record> record_;  ///< of the calibration that the session took over
   ProgressSink progress_;
   std::string page_;
 };
@@ -276,6 +282,50 @@ TEST_F(SessionReportTest, CutsEachCoefficientOfEachChannel) {
   for (const char* label : {"absorption σa, 1/mm", "scattering σs', 1/mm", "diffusion κ, mm"}) {
     EXPECT_THAT(shown, HasSubstr(label));
   }
+}
+
+// Red and blue change places: a correction that nobody could overlook.
+TEST_F(SessionReportTest, ShowsThePicturesInTheColoursThatTheChartTold) {
+  const auto own = report();
+  EXPECT_EQ(own["assumptions"]["Colours of the pictures"], "the camera's own, not corrected");
+  const auto picture = [&] {
+    const auto bytes = read_bytes(
+        session() / "preview" /
+            (own["relighting"]["lights"][0]["name"].get<std::string>() + "-captured.png"),
+        1 << 24);
+    return std::get<Image<std::uint8_t>>(decode_image(bytes.value()).value().pixels);
+  };
+  const auto before = picture();
+  std::filesystem::remove_all(session());
+  record_.emplace();
+  record_->version = 7;
+  record_->created = "2026-01-31T12:34:56Z";
+  record_->measured.color = calibration::ColorCorrection{calibration::ColorModel::kMatrix,
+                                                         {1.0, 1.0, 1.0},
+                                                         {0.1430804,
+                                                          0.3850649,
+                                                          0.4360747,
+                                                          0.0606169,
+                                                          0.7168786,
+                                                          0.2225045,
+                                                          0.7141733,
+                                                          0.0971045,
+                                                          0.0139322}};
+  const auto results = report();
+  EXPECT_EQ(results["assumptions"]["Colours of the pictures"],
+            "sRGB, by the 3 x 3 matrix of calibration 7 of 2026-01-31T12:34:56Z");
+  EXPECT_EQ(results["relighting_error"], own["relighting_error"]);  // judged by the camera's own
+  const auto after = picture();
+  ASSERT_EQ(after.samples().size(), before.samples().size());
+  int most = 0;
+  int colored = 0;
+  for (std::size_t i = 0; i < after.samples().size(); ++i) {
+    const std::size_t other = i % 3 == 0 ? i + 2 : i % 3 == 2 ? i - 2 : i;
+    most = std::max(most, std::abs(after.samples()[i] - before.samples()[other]));
+    colored = std::max(colored, std::abs(after.samples()[i] - before.samples()[i]));
+  }
+  EXPECT_LE(most, 1);  // rounding of the matrices
+  EXPECT_GT(colored, 10);
 }
 
 TEST_F(SessionReportTest, SaysWhatWasAssumedAndSetAndHowLongItTook) {
