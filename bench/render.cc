@@ -1,11 +1,7 @@
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <functional>
 #include <map>
-#include <ranges>
 #include <string>
 #include <vector>
 
@@ -17,11 +13,12 @@
 
 // render: how accurate and how fast the renderer's numerical ground is, as JSON lines. Groups of figures, all by default:
 //   sphere     error against the exact solution of a lit sphere, graph, finite elements and polygrid
-//   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1 against finite elements of half the size, 8 times
-//              as many, and what those themselves are still off (a third of what they differ from the same size, uniform)
+//   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1, and with twice as many elements, against finite
+//              elements of a quarter of the size, and what those are still off (a third of what half the size differs from them)
 //   geometry   where the error of elements of K = 0.1 comes from: the same facets with eight times as many elements, and what
 //              those are off
-//   transport  their exitance against Monte Carlo through the tetrahedra, split into model, discretisation and noise
+//   transport  their exitance against Monte Carlo through the tetrahedra, split into model, discretisation and noise; the model's
+//              by how many mean free paths thick the solid is there
 //   dials      processor seconds of one picture's light against its error, of the torus, for each method, size, K, tolerance and
 //              precision, and with and without the correction of links that lean
 //   mesh       seconds from a triangle mesh to a graph with its hierarchy; angles
@@ -46,7 +43,8 @@ int main(int argc, char** argv) try {
                                                             {"published", bench::measure_published},
                                                             {"raster", bench::measure_raster},
                                                             {"growth", bench::measure_growth}};
-  const std::string names = fmt::format("{}", fmt::join(groups | std::views::keys, ", "));
+  std::string names;
+  for (const auto& [name, measure] : groups) names += (names.empty() ? "" : ", ") + name;
   CLI::App app{
       "Accuracy and speed of the renderer's numerical ground.\n\nExample: scripts/bench render "
       "sphere mesh"};

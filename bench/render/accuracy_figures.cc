@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -44,6 +45,17 @@ void measure_dial(const std::string& which,
   }
 }
 
+/// The model's error by how thick the solid is.
+void print_bands(const std::string& which, const TransportError& error) {
+  for (const TransportError::Band& band : error.bands) {
+    if (!(band.area_mm2 > 0.0)) continue;
+    const std::string name = fmt::format("{}-below-{}-paths", which, band.below);
+    print_figure("render.model_error", name, band.model, "1");
+    print_figure("render.model_bias", name, band.bias, "1");
+    print_figure("render.model_area", name, band.area_mm2, "mm^2");
+  }
+}
+
 }  // namespace
 
 void measure_sphere() {
@@ -73,11 +85,15 @@ void measure_accuracy() {
           team);
     };
     using enum render::Discretisation;
-    const LitMarble reference = lit(kElements, 0.5 * spacing, 0.0);
+    const LitMarble reference = lit(kElements, 0.25 * spacing, 0.2);
     print_figure("render.reference_error_estimate",
                  name,
-                 lit(kElements, spacing, 0.0).error_against(reference) / 3.0,
+                 lit(kElements, 0.5 * spacing, 0.2).error_against(reference) / 3.0,
                  "1");
+    const LitMarble twice = lit(kElements, spacing / std::cbrt(2.0), 0.1);
+    const std::string doubled = std::string(name) + "-K0.1-fem-twice";
+    print_figure("render.error_vs_fem", doubled, twice.error_against(reference), "1");
+    print_figure("render.error_vs_fem_tets", doubled, static_cast<double>(twice.tetrahedra()), "1");
     for (const auto& [growth, k] : {std::pair{1.0, "K1"}, std::pair{0.1, "K0.1"}}) {
       for (const auto& [method, what] : {std::pair{kGraph, "graph"}, std::pair{kElements, "fem"}}) {
         const LitMarble marble = lit(method, spacing, growth);
@@ -162,6 +178,7 @@ void measure_transport() {
       print_figure("render.model_error", which, error.model, "1");
       print_figure("render.discretisation_error", which, error.discretisation, "1");
       print_figure("render.monte_carlo_noise", which, error.noise, "1");
+      print_bands(which, error);
       if (collimated) continue;
       const auto milne = transport_error(name,
                                          false,
@@ -174,6 +191,7 @@ void measure_transport() {
                                          team);
       print_figure("render.error_vs_monte_carlo", which + "-milne", milne.total, "1");
       print_figure("render.model_error", which + "-milne", milne.model, "1");
+      print_bands(which + "-milne", milne);
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -46,6 +47,17 @@ struct Case {
     return cosine > 0.0 ? cosine * (1.0 - sim::reflectance(std::min(1.0, cosine), 1.0, ior)) : 0.0;
   }
 };
+
+/// How thick a solid is below a place of its surface, in transport mean free paths of the green along the normal.
+double thickness_below(const render::SignedDistance& solid, Vec3 place, Vec3 normal) {
+  constexpr double kStep = 0.1;  // mm
+  double paths = 0.0;
+  for (int k = 1;; ++k) {
+    const Vec3 p = place - normal * (k * kStep);
+    if (k > 1 && !(solid.at(p) < 0.0)) return paths;
+    paths += kStep / (3.0 * marbled_optics(p).diffusion[kGreen]);
+  }
+}
 
 struct Exitance {
   std::vector<double> power;  // that leaves each patch
@@ -112,6 +124,8 @@ Exitance diffused(const Case& lit,
 struct Traced {
   Exitance exitance;
   std::vector<double> error;  // of each patch's power
+  std::vector<double>
+      thickness;  // of the solid below each patch, mean free paths, times the patch's area
 };
 
 Traced traced(const Case& lit, double spacing, double photons, Patches& patches) {
@@ -139,6 +153,8 @@ Traced traced(const Case& lit, double spacing, double photons, Patches& patches)
     power.push_back(area * lit.q(lit.collimated ? normalized(facet) : smooth));
     patch.push_back(patches.at(centre));
     found.exitance.add(patch.back(), 0.0, area);
+    found.thickness.resize(found.exitance.area.size());
+    found.thickness[patch.back()] += area * thickness_below(lit.solid, centre, smooth);
   }
   const auto result = sim::trace_tets(
       solid,
@@ -161,29 +177,48 @@ Traced traced(const Case& lit, double spacing, double photons, Patches& patches)
   return found;
 }
 
-/// Relative RMS of exitance, W/mm^2, over the area; `noise` of the second is taken out.
-double difference(const Exitance& a, const Exitance& b, double noise) {
+/// Which patches count.
+using Chosen = std::function<bool(std::size_t patch)>;
+
+struct Difference {
+  double rms = 0.0;   // relative, of exitance, W/mm^2, over the area
+  double bias = 0.0;  // of the power that leaves
+  double area = 0.0;
+};
+
+/// `noise` of the second is taken out of the RMS.
+Difference difference(const Exitance& a, const Exitance& b, double noise, const Chosen& chosen) {
   double error = 0.0;
   double size = 0.0;
+  double more = 0.0;
+  double power = 0.0;
+  Difference found;
   for (std::size_t k = 0; k < std::min(a.power.size(), b.power.size()); ++k) {
-    if (!(a.area[k] > 0.0) || !(b.area[k] > 0.0)) continue;
+    if (!(a.area[k] > 0.0) || !(b.area[k] > 0.0) || !chosen(k)) continue;
     const double truth = b.power[k] / b.area[k];
-    error += b.area[k] * std::pow(a.power[k] / a.area[k] - truth, 2);
+    const double off = a.power[k] / a.area[k] - truth;
+    error += b.area[k] * off * off;
     size += b.area[k] * truth * truth;
+    more += b.area[k] * off;
+    power += b.power[k];
+    found.area += b.area[k];
   }
-  return std::sqrt(std::max(0.0, error / size - noise * noise));
+  if (!(found.area > 0.0)) return found;
+  found.rms = std::sqrt(std::max(0.0, error / size - noise * noise));
+  found.bias = more / power;
+  return found;
 }
 
-double noise_of(const Traced& traced) {
+double noise_of(const Traced& traced, const Chosen& chosen) {
   double error = 0.0;
   double size = 0.0;
   for (std::size_t k = 0; k < traced.error.size(); ++k) {
     const double area = traced.exitance.area[k];
-    if (!(area > 0.0)) continue;
+    if (!(area > 0.0) || !chosen(k)) continue;
     error += traced.error[k] * traced.error[k] / area;
     size += traced.exitance.power[k] * traced.exitance.power[k] / area;
   }
-  return std::sqrt(error / size);
+  return size > 0.0 ? std::sqrt(error / size) : 0.0;
 }
 
 }  // namespace
@@ -203,10 +238,23 @@ TransportError transport_error(std::string_view name,
   const Exitance fine = diffused(lit, finer, patches, team);
   const Traced light = traced(lit, options.spacing_mm, photons, patches);
   TransportError error;
-  error.noise = noise_of(light);
-  error.total = difference(asked, light.exitance, error.noise);
-  error.model = difference(fine, light.exitance, error.noise);
-  error.discretisation = difference(asked, fine, 0.0);
+  const Chosen all = [](std::size_t) { return true; };
+  error.noise = noise_of(light, all);
+  error.total = difference(asked, light.exitance, error.noise, all).rms;
+  error.model = difference(fine, light.exitance, error.noise, all).rms;
+  error.discretisation = difference(asked, fine, 0.0, all).rms;
+  double least = 0.0;
+  for (TransportError::Band& band : error.bands) {
+    const Chosen within = [&](std::size_t k) {
+      const double thickness = light.thickness[k] / light.exitance.area[k];
+      return thickness >= least && thickness < band.below;
+    };
+    const Difference found = difference(fine, light.exitance, noise_of(light, within), within);
+    band.model = found.rms;
+    band.bias = found.bias;
+    band.area_mm2 = found.area;
+    least = band.below;
+  }
   error.patches = patches.count();
   return error;
 }

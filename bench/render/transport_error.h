@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <limits>
 #include <string_view>
 
 #include "base/thread_team.h"
@@ -16,6 +18,14 @@ struct TransportError {
       0.0;             ///< diffusion as asked for, against that on elements of half the size
   double noise = 0.0;  ///< of the Monte Carlo
   int patches = 0;
+  /// The model's error where the solid is so many mean free paths thick below the patch, and no less than the band before.
+  struct Band {
+    double below = 0.0;
+    double model = 0.0;     ///< relative RMS within the band
+    double bias = 0.0;      ///< of the power that leaves there
+    double area_mm2 = 0.0;  ///< how much of the surface that is
+  };
+  std::array<Band, 3> bands{{{4.0}, {8.0}, {std::numeric_limits<double>::infinity()}}};
 };
 
 /// Light q = n.l from one side, without shadows. Index-matched and diffuse; or collimated at eta = 1.3, transmitted and
