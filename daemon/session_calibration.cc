@@ -192,10 +192,8 @@ Result<capture::StationCalibration> session_calibration(const SessionDirectory& 
   if (*placement) {
     const auto record = record_of(session);
     if (!record) return record.error();
-    *calibration = calibration::with_place(*std::move(calibration),
-                                           record->measured,
-                                           (*placement)->camera_from_sample,
-                                           (*placement)->covariance);
+    *calibration = calibration::with_place(
+        *calibration, record->measured, (*placement)->camera_from_sample, (*placement)->covariance);
   }
   if (!(calibration->camera.model == rig.calibration.camera.model)) {
     if (auto kept = keep_camera(session, files, calibration->camera.model); !kept)

@@ -111,9 +111,13 @@ void LitFace::sample(const Block& block, Face lit_face, int across, int down) {
       std::max(2, static_cast<int>(std::ceil(2.0 * std::max(width, height) / pixel_mm)));
   for (int i = 0; i < across * down; ++i) {
     first_share_.push_back(shares_.size());
+    const int across_at = i % across;
+    const int down_at = i / across;
     for (int k = 0; k < points * points; ++k) {
-      const double column = (i % across + (k % points + 0.5) / points) * width;
-      const double row = (i / across + (k / points + 0.5) / points) * height;
+      const int point_column = k % points;
+      const int point_row = k / points;
+      const double column = (across_at + (point_column + 0.5) / points) * width;
+      const double row = (down_at + (point_row + 0.5) / points) * height;
       const Vec3 there = point_at(axes, column, row);
       const Vec3 to_lamp = lamp - there;
       const double distance = length(to_lamp);
