@@ -50,8 +50,10 @@ PixelBox PerspectiveLight::box_of(const LitRectangle& r) const {
   const CellSize cell = face_cell_size(block_, face_);
   std::array<Pixel, 9> seen{};
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const double column = r.left + 0.5 * static_cast<double>(i % 3) * r.width;
-    const double row = r.top + 0.5 * static_cast<double>(i / 3) * r.height;
+    const std::size_t across = i % 3;
+    const std::size_t down = i / 3;
+    const double column = r.left + 0.5 * static_cast<double>(across) * r.width;
+    const double row = r.top + 0.5 * static_cast<double>(down) * r.height;
     seen[i] =
         projector_.lens.project(face_point(block_, face_, column / cell.width, row / cell.height));
   }

@@ -219,7 +219,8 @@ TEST(ProjectorOptics, InPerspectiveLightFallsOffWithDistanceAndAngle) {
   const auto lit =
       LitFace(p, block, Face::kZMin, 4, 4).irradiance(support::flat_pattern(options, 1, 255).codes);
   for (int i = 0; i < 16; ++i) {
-    const Vec3 way = lamp - Vec3{2.0 * (i % 4) + 1.0, 2.0 * (i / 4) + 1.0, 0.0};
+    const int down = i / 4;
+    const Vec3 way = lamp - Vec3{2.0 * (i % 4) + 1.0, 2.0 * down + 1.0, 0.0};
     const double expected = 1e-3 * 150.0 * 150.0 / dot(way, way) * -way.z / length(way);
     EXPECT_NEAR(lit[static_cast<std::size_t>(i)][1], expected, 5e-5 * expected) << i;
   }
@@ -256,7 +257,8 @@ TEST(ProjectorOptics, InPerspectiveAPixelLightsWhereItsRayFalls) {
     const double e = lit[static_cast<std::size_t>(i)][0];
     sum += e;
     column += e * (i % n + 0.5) * 8.0 / n;
-    row += e * (i / n + 0.5) * 8.0 / n;
+    const int down = i / n;
+    row += e * (down + 0.5) * 8.0 / n;
   }
   const FacePlace place = lit_by(p, block, Face::kZMin, 52.5, 37.5);
   ASSERT_GT(sum, 0.0);
