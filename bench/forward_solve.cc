@@ -71,13 +71,15 @@ double triad_bytes_per_second() {
 
 /// The bytes that the algorithm has to move once it runs in passes that each see the finest level once, with a cache
 /// that holds the planes at work and nothing between two passes; a store counts once, as where it is not read before.
-/// Fields of 16 right-hand sides in the working precision ("number"), z in the precision that it is stored in.
+/// Fields of 16 right-hand sides in the working precision ("number"), z in the precision that it is stored in; on the
+/// finest level of black cells only, which are half of them.
 ///
 ///   an iteration   restriction reads r; prolongation reads r, writes z; the update reads z, p, d, r, writes p, d, r;
-///                  8, 9 and 4 coefficients a cell; a seventh more for the coarser levels of the first two
-///   a replacement  the one at 1e-5, from x = 0, reads d, p, b, writes x and r; the last reads x, d, p, b and writes x;
+///                  8, 8 and 5 coefficients a cell; a seventh of whole fields and 17 coefficients for the coarser
+///                  levels of the first two
+///   a replacement  the one at 1e-5 reads x, d, p, b, writes x and r; the last reads x, d, p, b and writes x;
 ///                  7 coefficients in float64 each
-///   the start      looks at b and x, reads b, writes r
+///   the start      looks at b and x, reads b, writes red x and r, 7 coefficients in float64
 ///   the set-up     reads kappa and sigma_a, writes 7 coefficients in float64, reads them, writes 9; an eighth more
 double bytes_counted(const ForwardCase& problem,
                      int iterations,
@@ -88,12 +90,13 @@ double bytes_counted(const ForwardCase& problem,
   constexpr double kExact = sizeof(double);
   const auto values = static_cast<double>(problem.b.values.size());
   const auto cells = static_cast<double>(problem.b.cells);
-  const double cycle = values * (2.0 * number + stored) + cells * 17.0 * number;
-  const double update = values * (6.0 * number + stored) + cells * 4.0 * number;
-  const double replacements = values * (5.0 * kExact + 5.0 * number) + cells * 14.0 * kExact;
-  const double start = values * (3.0 * kExact + number);
+  const double finest = values * (1.0 * number + 0.5 * stored) + cells * 16.0 * number;
+  const double coarser = (values * (2.0 * number + stored) + cells * 17.0 * number) / 7.0;
+  const double update = values * (3.0 * number + 0.5 * stored) + cells * 5.0 * number;
+  const double replacements = values * (6.0 * kExact + 2.5 * number) + cells * 14.0 * kExact;
+  const double start = values * (4.0 * kExact + 0.5 * number) + cells * 7.0 * kExact;
   const double setup = cells * (16.0 * kExact + 9.0 * number) * 8.0 / 7.0;
-  return iterations * (cycle * 8.0 / 7.0 + update) + replacements + start + setup;
+  return iterations * (finest + coarser + update) + replacements + start + setup;
 }
 
 struct Timed {

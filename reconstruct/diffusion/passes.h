@@ -43,6 +43,9 @@ namespace opaline::reconstruct::diffusion {
 /// In single precision q = c p + sum g (p_i - p_j) with c = D - sum g, differences first: D p - sum g p loses as many
 /// digits as K is ill-conditioned, and conjugate gradients then need half as many iterations again.
 ///
+/// A back end may relax the red cells of x in float64 before it takes the residual, and then iterate on the black ones
+/// alone: r stays zero in red cells under K with those eliminated (host/host_passes.h).
+///
 /// A back end may take gamma from z . K z and its recurrence (Chronopoulos & Gear 1989) and make p and q only in
 /// update_norm. It may delay d += alpha p up to the next update_norm or true_residual, and may scale each
 /// right-hand side by a constant of its own and K by another (||b|| = 1 and D <= 1 keep single precision

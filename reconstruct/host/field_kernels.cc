@@ -1,5 +1,7 @@
 #include "reconstruct/host/field_kernels.h"
 
+#include <cstdint>
+
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reconstruct/host/field_kernels.cc"
@@ -18,25 +20,72 @@ using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
-HWY_INLINE void store(V a, double* at) { hn::StoreU(a, D(), at); }
-HWY_INLINE void store(V a, float* at) {
-  const hn::Rebind<float, D> f;
-  hn::StoreU(hn::DemoteTo(f, a), f, at);
-}
-HWY_INLINE V load(const double* at) { return hn::LoadU(D(), at); }
-HWY_INLINE V load(const float* at) {
-  return hn::PromoteTo(D(), hn::LoadU(hn::Rebind<float, D>(), at));
+/// The lanes that hold every other cell from `first` on, lane 0 being cell i.
+HWY_INLINE M every_other(int i, int first) {
+  const hn::RebindToSigned<D> n;
+  const auto parity = hn::And(hn::Iota(n, i), hn::Set(n, 1));
+  return hn::RebindMask(D(), hn::Eq(parity, hn::Set(n, first)));
 }
 
-/// b - K x in the cells of the mask; those of `later` have a cell before them, those of `inner` one after.
-HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M later, M inner) {
+/// Packs the lanes first, first + 2, ...
+HWY_INLINE void store_every_other(V a, double* at, int first) {
+  HWY_ALIGN double lanes[hn::MaxLanes(D())];
+  hn::Store(a, D(), lanes);
+  for (std::size_t n = first; n < hn::Lanes(D()); n += 2) *at++ = lanes[n];
+}
+
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE void store_every_other(V a, float* at, int first) {
+  if (first == 0) *at = static_cast<float>(hn::GetLane(a));
+}
+#else
+using Pair =
+    hn::Repartition<std::uint64_t, hn::Rebind<float, D> >;  // of float32, the first one low
+
+HWY_INLINE void store_every_other(V a, float* at, int first) {
+  const hn::Rebind<std::uint32_t, Pair> one;
+  const auto pairs = hn::BitCast(Pair(), hn::DemoteTo(hn::Rebind<float, D>(), a));
+  const auto packed = hn::TruncateTo(one, first == 0 ? pairs : hn::ShiftRight<32>(pairs));
+  hn::StoreU(packed, one, reinterpret_cast<std::uint32_t*>(at));
+}
+
+/// The way back, with zeros in between.
+HWY_INLINE V load_every_other(const float* at, int first) {
+  const hn::Rebind<std::uint32_t, Pair> one;
+  const auto pairs =
+      hn::PromoteTo(Pair(), hn::LoadU(one, reinterpret_cast<const std::uint32_t*>(at)));
+  const hn::Rebind<float, D> single;
+  return hn::PromoteTo(D(), hn::BitCast(single, first == 0 ? pairs : hn::ShiftLeft<32>(pairs)));
+}
+#endif
+
+/// Every other cell from `first`, as lanes of the vector at i; `later` have a cell before them, `inner` one after.
+struct Cells {
+  M all;
+  M later;
+  M inner;
+
+  HWY_INLINE Cells(M colour, int i, int nx) : all(colour), later(colour), inner(colour) {
+    const D d;
+    const auto left = [&](int cells) { return hn::FirstN(d, static_cast<std::size_t>(cells)); };
+    if (i + static_cast<int>(hn::Lanes(d)) >= nx) {
+      all = later = hn::And(colour, left(nx - i));
+      inner = hn::And(colour, left(nx - 1 - i));
+    }
+    if (i == 0) later = hn::AndNot(left(1), all);
+  }
+};
+
+/// b - K x in those cells, whose neighbours have the other colour: nothing else is read.
+HWY_INLINE V residual_at(const FieldLine& l, int i, const Cells& cells) {
   const D d;
-  const auto at = [&](const double* row) { return hn::MaskedLoad(cells, d, row + i); };
+  const auto at = [&](const double* row) { return hn::MaskedLoad(cells.all, d, row + i); };
   V a = at(l.b);
   if (l.x == nullptr) return a;
   a = hn::NegMulAdd(at(l.diagonal), at(l.x), a);
-  a = hn::MulAdd(hn::MaskedLoad(later, d, l.gx + i - 1), hn::MaskedLoad(later, d, l.x + i - 1), a);
-  a = hn::MulAdd(at(l.gx), hn::MaskedLoad(inner, d, l.x + i + 1), a);
+  a = hn::MulAdd(
+      hn::MaskedLoad(cells.later, d, l.gx + i - 1), hn::MaskedLoad(cells.later, d, l.x + i - 1), a);
+  a = hn::MulAdd(at(l.gx), hn::MaskedLoad(cells.inner, d, l.x + i + 1), a);
   if (l.y_before != nullptr) a = hn::MulAdd(at(l.gy_before), at(l.y_before), a);
   if (l.y_after != nullptr) a = hn::MulAdd(at(l.gy_after), at(l.y_after), a);
   if (l.z_before != nullptr) a = hn::MulAdd(at(l.gz_before), at(l.z_before), a);
@@ -44,42 +93,70 @@ HWY_INLINE V residual_at(const FieldLine& l, int i, M cells, M later, M inner) {
   return a;
 }
 
+HWY_INLINE void prefetch(const FieldLine& l, int i) {
+  hwy::Prefetch(l.b + i + kAhead);
+  if (l.z_after != nullptr) hwy::Prefetch(l.z_after + i + kAhead);
+}
+
+void relax(const FieldLine& line, double* x, int first, int nx) {
+  const FieldLine l = line;  // not to be read again after every store
+  const D d;
+  const auto step = static_cast<int>(hn::Lanes(d));
+  const V one = hn::Set(d, 1.0);
+  M colour = every_other(0, first);
+  for (int i = 0; i < nx; i += step) {
+    prefetch(l, i);
+    if (step == 1) colour = every_other(i, first);
+    const Cells cells(colour, i, nx);
+    const V diagonal = hn::MaskedLoad(cells.all, d, l.diagonal + i);
+    const V change = hn::Div(residual_at(l, i, cells), hn::IfThenElse(cells.all, diagonal, one));
+    const V before = l.x == nullptr ? hn::Zero(d) : hn::MaskedLoad(cells.all, d, l.x + i);
+    hn::BlendedStore(hn::Add(before, change), cells.all, d, x + i);
+  }
+}
+
 template <class T>
-double residual(const FieldLine& line, double scale, T* r, int nx) {
+double residual(const FieldLine& line, double scale, T* r, int first, int nx) {
   const FieldLine l = line;  // not to be read again after every store
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
   const V factor = hn::Set(d, scale);
   V sum = hn::Zero(d);
-  const M all = hn::FirstN(d, static_cast<std::size_t>(step));
-  const M first = hn::FirstN(d, 1);
+  M colour = every_other(0, first);
   for (int i = 0; i < nx; i += step) {
-    hwy::Prefetch(l.b + i + kAhead);
-    if (l.z_after != nullptr) hwy::Prefetch(l.z_after + i + kAhead);
-    const bool whole = i + step < nx;
-    const M cells = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - i));
-    const M inner = whole ? all : hn::FirstN(d, static_cast<std::size_t>(nx - 1 - i));
-    const M later = i == 0 ? hn::AndNot(first, cells) : cells;
-    const V a = residual_at(l, i, cells, later, inner);
+    prefetch(l, i);
+    if (step == 1) colour = every_other(i, first);
+    const V a = residual_at(l, i, Cells(colour, i, nx));
     sum = hn::MulAdd(a, a, sum);
-    if (r != nullptr) store(hn::Mul(a, factor), r + i);
+    if (r != nullptr) store_every_other(hn::Mul(a, factor), r + i / 2, (first + i) % 2);
   }
   return hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
-/// x = factor c, on top of what x was where it is kept.
-template <bool kKept, class T>
-void move(double* x, const T* c, double factor, int nx) {
+template <class T>
+void add_from(double* x, const T* c, double factor, int first, int nx) {
+  for (int i = first; i < nx; i += 2) x[i] += factor * static_cast<double>(c[i / 2]);
+}
+
+void add(double* x, const double* c, double factor, int first, int nx) {
+  add_from(x, c, factor, first, nx);
+}
+
+void add(double* x, const float* c, double factor, int first, int nx) {
+#if HWY_TARGET == HWY_SCALAR
+  add_from(x, c, factor, first, nx);
+#else
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
   const V f = hn::Set(d, factor);
   int i = 0;
   for (; i + step <= nx; i += step) {
-    if constexpr (kKept) hwy::Prefetch(x + i + kAhead);
-    const V before = kKept ? hn::LoadU(d, x + i) : hn::Zero(d);
-    hn::StoreU(hn::MulAdd(f, load(c + i), before), d, x + i);
+    hwy::Prefetch(x + i + kAhead);
+    const V before = hn::LoadU(d, x + i);
+    hn::StoreU(hn::MulAdd(f, load_every_other(c + i / 2, first), before), d, x + i);
   }
-  for (; i < nx; ++i) x[i] = (kKept ? x[i] : 0.0) + factor * static_cast<double>(c[i]);
+  add_from(x + i, c + i / 2, factor, first, nx - i);
+#endif
 }
 
 template <class T>
@@ -189,11 +266,9 @@ void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, 
 }
 #endif
 
-FieldKernels<float> single_kernels() {
-  return {residual<float>, move<true, float>, move<false, float>, to_fields, to_lanes};
-}
+FieldKernels<float> single_kernels() { return {relax, residual<float>, add, to_fields, to_lanes}; }
 FieldKernels<double> double_kernels() {
-  return {residual<double>, move<true, double>, move<false, double>, to_fields, to_lanes};
+  return {relax, residual<double>, add, to_fields, to_lanes};
 }
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE

@@ -26,14 +26,16 @@ struct FieldLine {
 /// Numbers that a line of nx takes in a buffer, where whole registers are written.
 constexpr std::size_t padded(int nx) { return (static_cast<std::size_t>(nx) + 31) / 16 * 16; }
 
+/// Every other cell: a line's cells first, first + 2, ..., which lie side by side where they are packed.
 template <class T>
 struct FieldKernels {
-  /// r = scale (b - K x) along the line, padded(nx) long, unless r is null; returns the sum of (b - K x)^2.
-  double (*residual)(const FieldLine& line, double scale, T* r, int nx);
-  /// x += factor c.
-  void (*add)(double* x, const T* c, double factor, int nx);
-  /// x = factor c.
-  void (*set)(double* x, const T* c, double factor, int nx);
+  /// x = (b + sum g x) / D in every other cell; a null line.x is zero.
+  void (*relax)(const FieldLine& line, double* x, int first, int nx);
+  /// r = scale (b - K x) in every other cell, packed, unless r is null; returns the sum of (b - K x)^2
+  /// there.
+  double (*residual)(const FieldLine& line, double scale, T* r, int first, int nx);
+  /// x += factor c in every other cell; c packed.
+  void (*add)(double* x, const T* c, double factor, int first, int nx);
   /// fields[m stride + i] = d + step[m] p of lane m in cell i; without d that is zero.
   void (*to_fields)(
       const T* d, const T* p, const T* step, T* fields, std::size_t stride, int width, int nx);

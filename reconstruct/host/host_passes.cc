@@ -7,12 +7,6 @@
 namespace opaline::reconstruct::host {
 namespace {
 
-constexpr int kRed = 0;
-constexpr int kBlack = 1;
-
-/// The first cell of a colour on line (j, k), from an even cell on.
-int first_of(int colour, int j, int k) { return (j + k + colour) % 2; }
-
 bool inside(int at, int begin, int end, int count) {
   return at >= std::max(begin, 0) && at < std::min(end, count);
 }
@@ -43,7 +37,7 @@ HostPasses<T, S>::HostPasses(ThreadTeam& team,
       growth_(work.width, 1.0),
       rho_(work.width, 0.0),
       rho_before_(work.width, 0.0),
-      swept_(work.width, 0.0),
+      energy_(work.width, 0.0),
       gamma_(work.width, 0.0),
       norms_(group.count, 0.0) {
   factor_.fill(T{1});
@@ -83,7 +77,7 @@ Stencil<T> HostPasses<T, S>::stencil(
     const HostLevel<T>& level, const Planes& u, int j, int k, int x) const {
   const auto row = [&](const T* plane, int at) -> const T* {
     const int local = at - u.low_inner;
-    if (plane == nullptr || local < 0 || local >= u.rows) return work_.zeros.data() + width_;
+    if (plane == nullptr || local < 0 || local >= u.rows) return work_.zeros.data() + 2 * width_;
     return plane + local * u.row_size + static_cast<std::size_t>(x - u.low_x) * width_;
   };
   const std::size_t at = level.row(j, k) + x;
@@ -102,18 +96,44 @@ Stencil<T> HostPasses<T, S>::stencil(
 }
 
 template <class T, class S>
-void HostPasses<T, S>::scale_row(const Wave& w, int j, int k) {
+auto HostPasses<T, S>::packed_stencil(const Planes& u, int cell, int j, int k, int first) const
+    -> PackedStencil<T> {
+  const Stencil<T> s = stencil(grid_.levels[0], u, j, k, 0);
+  return {s.u + static_cast<std::ptrdiff_t>(first - 1) * cell,
+          s.u + static_cast<std::ptrdiff_t>(first) * cell,
+          s.inner_before,
+          s.inner_after,
+          s.outer_before,
+          s.outer_after,
+          s.gx,
+          s.gi_before,
+          s.gi_after,
+          s.go_before,
+          s.go_after};
+}
+
+/// Null in the red cells of level 0, where r is zero.
+template <class T, class S>
+const T* HostPasses<T, S>::right_row(const Wave& w, int j, int k, int colour) const {
+  if (w.l > 0) return work_.r[w.l].cell(w.tile.x.low, j, k, width_);
+  return colour == kRed ? nullptr : work_.r[0].cell(w.tile.x.low / 2, j, k, width_);
+}
+
+template <class T, class S>
+void HostPasses<T, S>::scale_row(const Wave& w, int j, int k, int colour) {
   kernels_.scale(ring_row(w, j, k),
-                 work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                 right_row(w, j, k, colour),
+                 w.l == 0,
                  w.level.inverse + w.level.row(j, k) + w.tile.x.low,
-                 first_of(kRed, j, k),
+                 first_of(colour, j, k),
                  w.tile.x.size());
 }
 
 template <class T, class S>
 void HostPasses<T, S>::sweep_row(const Wave& w, int j, int k, int colour) {
   kernels_.sweep(ring_row(w, j, k),
-                 work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                 right_row(w, j, k, colour),
+                 w.l == 0,
                  w.level.inverse + w.level.row(j, k) + w.tile.x.low,
                  stencil(w.level, around(w, k), j, k, w.tile.x.low),
                  first_of(colour, j, k),
@@ -133,18 +153,19 @@ void HostPasses<T, S>::restrict_wave(const Wave& w) {
   const int halo = ratio - 1;  // planes beyond the slab that reach into it
   const int begin = w.slab.begin * ratio - halo;
   const int end = std::min(w.level.no, w.slab.end * ratio) + halo;
+  const int last = w.l == 0 ? 1 : 2;  // on level 0 red cells are zero, and black ones r / D
   const Range& rows = w.tile.inner;
-  for (int k = begin - 2; k < end + 2; ++k) {
-    const bool scales = inside(k, begin - 2, end + 2, w.level.no);
-    const bool sweeps = inside(k - 1, begin - 1, end + 1, w.level.no);
-    const bool restricts = inside(k - 2, begin, end, w.level.no);
-    if (restricts) clear_below(w, k - 2);
+  for (int k = begin - last; k < end + last; ++k) {
+    const bool scales = inside(k, begin - last, end + last, w.level.no);
+    const bool sweeps = w.l > 0 && inside(k - 1, begin - 1, end + 1, w.level.no);
+    const bool restricts = inside(k - last, begin, end, w.level.no);
+    if (restricts) clear_below(w, k - last);
     for (int j = rows.low; j < rows.high; ++j) {
-      if (scales) scale_row(w, j, k);
+      if (scales) scale_row(w, j, k, w.l == 0 ? kBlack : kRed);
       if (sweeps) sweep_row(w, j, k - 1, kBlack);
-      if (restricts) restrict_row(w, j, k - 2);
+      if (restricts) restrict_row(w, j, k - last);
     }
-    if (restricts) store_below(w, k - 2);
+    if (restricts) store_below(w, k - last);
   }
 }
 
@@ -228,30 +249,31 @@ void HostPasses<T, S>::prolong_smooth(int l) {
   if (l > 0) return;
   rho_before_ = rho_;
   total(work_.rho_sums, rho_);
-  total(work_.swept_sums, swept_);
+  total(work_.energy_sums, energy_);
 }
 
 template <class T, class S>
 void HostPasses<T, S>::prolong_wave(const Wave& w) {
   const bool last = w.l + 1 == levels();
-  const int more = w.l == 0 ? 1 : 0;  // one plane on either side for z . K z
-  const int begin = w.slab.begin - more;
-  const int end = w.slab.end + more;
+  const int begin = w.slab.begin;
+  const int end = w.slab.end;
   const Range& rows = w.tile.inner;
   for (int k = begin - 2; k < end + 2; ++k) {
     const bool starts = inside(k, 0, w.level.no, w.level.no);
     const bool sweeps = inside(k - 1, begin - 1, end + 1, w.level.no);
-    const bool ends = inside(k - 2, begin, end, w.level.no);
-    const bool emits = w.slab.has(k - 2);
-    const bool sums = w.l == 0 && w.slab.has(k - 3);
-    if (emits && w.l == 0) clear_sums(k - 2, w.tile_index);
+    const bool ends = w.slab.has(k - 2);
+    if (ends && w.l == 0) clear_sums(k - 2, w.tile_index);
     for (int j = rows.low; j < rows.high; ++j) {
-      if (starts) last ? scale_row(w, j, k) : prolong_row(w, j, k);
+      if (starts) last ? scale_row(w, j, k, kRed) : prolong_row(w, j, k);
       if (sweeps) sweep_row(w, j, k - 1, kBlack);
-      if (ends) sweep_row(w, j, k - 2, kRed);
-      if (j < rows.begin || j >= rows.end) continue;
-      if (emits) emit_row(w, j, k - 2);
-      if (sums) energy_row(w, j, k - 3);
+      if (!ends || j < rows.begin || j >= rows.end) continue;
+      if (w.l == 0) {
+        emit_row(w, j, k - 2);
+        energy_row(w, j, k - 2);
+      } else {
+        sweep_row(w, j, k - 2, kRed);
+        copy_row(w, j, k - 2);
+      }
     }
   }
 }
@@ -265,7 +287,7 @@ void HostPasses<T, S>::prolong_row(const Wave& w, int j, int k) {
     return there ? above.cell(x, at, plane, width_) : work_.stored_zeros.data() + width_;
   };
   kernels_.prolong(ring_row(w, j, k),
-                   work_.r[w.l].cell(w.tile.x.low, j, k, width_),
+                   right_row(w, j, k, kRed),
                    w.level.inverse + w.level.row(j, k) + w.tile.x.low,
                    weights(w, j, k),
                    {row(true, from.j, from.k),
@@ -276,15 +298,23 @@ void HostPasses<T, S>::prolong_row(const Wave& w, int j, int k) {
 }
 
 template <class T, class S>
+void HostPasses<T, S>::copy_row(const Wave& w, int j, int k) {
+  const Range& x = w.tile.x;
+  kernels_.copy(work_.z[w.l].cell(x.begin, j, k, width_),
+                ring_row(w, j, k) + static_cast<std::size_t>(x.begin - x.low) * width_,
+                x.end - x.begin);
+}
+
+template <class T, class S>
 void HostPasses<T, S>::emit_row(const Wave& w, int j, int k) {
   const Range& x = w.tile.x;
-  const std::size_t sums = sums_at(k, w.tile_index);
-  kernels_.emit(work_.z[w.l].cell(x.begin, j, k, width_),
+  kernels_.emit(work_.z[0].cell(x.begin / 2, j, k, width_),
                 ring_row(w, j, k) + static_cast<std::size_t>(x.begin - x.low) * width_,
-                work_.r[w.l].cell(x.begin, j, k, width_),
-                w.l == 0 ? &work_.rho_sums[sums] : nullptr,
-                w.l == 0 ? &work_.swept_sums[sums] : nullptr,
-                first_of(kRed, j, k),
+                work_.r[0].cell(x.begin / 2, j, k, width_),
+                w.level.sink + w.level.row(j, k) + x.begin,
+                &work_.rho_sums[sums_at(k, w.tile_index)],
+                &work_.energy_sums[sums_at(k, w.tile_index)],
+                first_of(kBlack, j, k),
                 x.end - x.begin);
 }
 
@@ -292,9 +322,10 @@ template <class T, class S>
 void HostPasses<T, S>::energy_row(const Wave& w, int j, int k) {
   const Range& x = w.tile.x;
   kernels_.energy(w.level.sink + w.level.row(j, k) + x.begin,
+                  w.level.inverse + w.level.row(j, k) + x.begin,
                   stencil(w.level, around(w, k), j, k, x.begin),
-                  &work_.swept_sums[sums_at(k, w.tile_index)],
-                  first_of(kBlack, j, k),
+                  &work_.energy_sums[sums_at(k, w.tile_index)],
+                  first_of(kRed, j, k),
                   x.end - x.begin);
 }
 
@@ -305,7 +336,7 @@ std::size_t HostPasses<T, S>::sums_at(int plane, std::size_t tile) const {
 
 template <class T, class S>
 void HostPasses<T, S>::clear_sums(int plane, std::size_t tile) {
-  for (auto* sums : {&work_.rho_sums, &work_.swept_sums, &work_.norm_sums})
+  for (auto* sums : {&work_.rho_sums, &work_.energy_sums, &work_.norm_sums})
     std::fill_n(sums->data() + sums_at(plane, tile), width_, 0.0);
 }
 

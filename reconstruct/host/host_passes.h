@@ -15,6 +15,12 @@
 
 namespace opaline::reconstruct::host {
 
+constexpr int kRed = 0;
+constexpr int kBlack = 1;
+
+/// The first cell of a colour on line (j, k), from an even cell on.
+constexpr int first_of(int colour, int j, int k) { return (j + k + colour) % 2; }
+
 /// Up to 16 fields of the caller's batches, solved together.
 struct Group {
   const diffusion::FieldBatch& b;
@@ -22,7 +28,7 @@ struct Group {
   int first = 0;
   int count = 1;
   std::span<const double> b_norms;  ///< ||b||^2 of the group's fields
-  bool x_is_zero = false;           ///< where that is known; it saves the first product
+  bool x_is_zero = false;           ///< where that is known; it need not be read
 };
 
 /// The passes of diffusion/passes.h for the processor. T computes, S is how corrections lie in
@@ -34,14 +40,26 @@ struct Group {
 /// no thread reads what another one writes, and the numbers are the same however the planes are
 /// shared.
 ///
-/// The iteration reads and writes the finest level three times and stores no q = K p: the last
-/// half-sweep also sums delta = z . K z, from which
+/// Conjugate gradients run on the black cells alone. x is relaxed in the red ones in float64 before its
+/// residual is taken, so r vanishes there and stays so under
 ///
-///   p . K p = delta - beta^2 p_before . K p_before          (Chronopoulos & Gear 1989, J. Comput.
+///   S = K_bb - K_br K_rr^-1 K_rb      (Saad 2003, Iterative Methods for Sparse Linear Systems, 12.4.2)
+///
+/// whose conjugate gradients move half of the bytes, and whose V-cycle is that of K on r = 0 in red
+/// cells: z there is not kept. In single precision t = K_rr^-1 K_rb p comes with what its rounding
+/// left, or S p would lose as many digits as K is ill-conditioned.
+///
+/// The iteration reads and writes the finest level three times and stores no q = S p. After the last
+/// half-sweep the red cells take z_r = (sum g z_b) / D for
+///
+///   delta = z . S z = sum c z^2 + sum over faces g (z_r - z_b)^2,
+///
+/// which cannot cancel, and rounding of z_r adds to in second order only, for there it is least; then
+///
+///   p . S p = delta - beta^2 p_before . S p_before          (Chronopoulos & Gear 1989, J. Comput.
 ///                                                            Appl. Math. 25, section 3)
 ///
-/// so alpha is known before p is, and one sweep makes p, K p and the new r. Where a red cell has
-/// just been relaxed K z = r there, which is half of delta.
+/// so alpha is known before p is, and one sweep makes p, S p and the new r.
 ///
 /// Right-hand sides are scaled to ||b|| = 1 and then by a power of two that keeps ||r|| near 1, the
 /// matrix by HostGrid::unit. All arguments must outlive the object.
@@ -108,10 +126,12 @@ class HostPasses {
   Planes around(const Wave& w, int k) const;
   T* ring_row(const Wave& w, int j, int k) const;
   Stencil<T> stencil(const HostLevel<T>& level, const Planes& u, int j, int k, int x) const;
+  PackedStencil<T> packed_stencil(const Planes& u, int cell, int j, int k, int first) const;
   Parents parents(int level, int j, int k) const;
   Weights<T> weights(const Wave& w, int j, int k) const;
 
-  void scale_row(const Wave& w, int j, int k);
+  const T* right_row(const Wave& w, int j, int k, int colour) const;
+  void scale_row(const Wave& w, int j, int k, int colour);
   void sweep_row(const Wave& w, int j, int k, int colour);
   void restrict_wave(const Wave& w);
   void restrict_row(const Wave& w, int j, int k);
@@ -119,20 +139,27 @@ class HostPasses {
   void store_below(const Wave& w, int k);
   void prolong_wave(const Wave& w);
   void prolong_row(const Wave& w, int j, int k);
+  void copy_row(const Wave& w, int j, int k);
   void emit_row(const Wave& w, int j, int k);
   void energy_row(const Wave& w, int j, int k);
   void combine_halo(Slab slab);
   void update_slab(Slab slab, Direction mode);
   void move_rows(Rows rows, int k, Direction mode);
-  void update_rows(Rows rows, int k, const Planes& u);
+  void relax_rows(Rows rows, int k, const Planes& p, int thread);
+  void update_rows(Rows rows, int k, const Planes& t);
+  int black_cells(int j, int k) const;
   void rescale();
   std::span<const double> residual_pass(bool keeps);
   void residual_slab(Slab slab, bool moves);
+  bool relaxes_late(Slab slab, int z) const;
+  bool answers_late(Slab slab, int z) const;
+  void relax_ends(Slab slab);
   void residual_ends(Slab slab);
   void add_correction(Rows rows, int z, int thread);
+  void relax_lines(Rows rows, int z);
   void residual_rows(Rows rows, int z, int thread);
   int rows_at_once(int thread) const;
-  FieldLine field_line(int m, int y, int z) const;
+  FieldLine field_line(int m, int y, int z, bool dark) const;
   std::size_t sums_at(int plane, std::size_t tile) const;
   void clear_sums(int plane, std::size_t tile);
   void total(const std::vector<double>& parts, std::vector<double>& sums) const;
@@ -148,14 +175,13 @@ class HostPasses {
   bool step_ = false;        ///< d lacks step_length p
   bool restart_ = false;
   bool keeps_ = true;          ///< the residual pass stores r
-  bool sets_ = false;          ///< it sets x, which was zero
   std::array<T, 16> alpha_{};  ///< rho / gamma
   std::array<T, 16> step_length_{};
   std::array<T, 16> beta_{};
   std::array<T, 16> factor_{};  ///< by which r is rescaled
   std::vector<double> scale_;   ///< 1 / ||b||
   std::vector<double> growth_;  ///< the power of two
-  std::vector<double> rho_, rho_before_, swept_, gamma_, norms_;
+  std::vector<double> rho_, rho_before_, energy_, gamma_, norms_;
 };
 
 template <class T, class S>

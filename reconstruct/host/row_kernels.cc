@@ -75,12 +75,6 @@ struct Lanes {
   HWY_INLINE void scale(const Lanes& factor) {
     for (int n = 0; n < kCount; ++n) v[n] = hn::Mul(v[n], factor.v[n]);
   }
-  /// += factor * (u - what lies at `at`).
-  HWY_INLINE void add_difference(T factor, const Lanes& u, const T* at) {
-    const V f = hn::Set(D(), factor);
-    for (int n = 0; n < kCount; ++n)
-      v[n] = hn::MulAdd(f, hn::Sub(u.v[n], hn::LoadU(D(), at + n * kLanes)), v[n]);
-  }
   /// += a * b, lane by lane.
   HWY_INLINE void add(const Lanes& a, const Lanes& b) {
     for (int n = 0; n < kCount; ++n) v[n] = hn::MulAdd(a.v[n], b.v[n], v[n]);
@@ -115,20 +109,16 @@ HWY_INLINE void add_neighbours(Lanes<T, W>& a, const Stencil<T>& s, std::ptrdiff
   a.add(s.go_after[i], L::load(s.outer_after + at));
 }
 
-/// a += sum g (u_i - u) over the six neighbours of cell i. Subtracting first keeps single precision exact where u is
-/// smooth; D u - sum g u would lose as many digits as K is ill-conditioned.
-template <int W, class T>
-HWY_INLINE void add_flows(Lanes<T, W>& a,
-                          const Lanes<T, W>& u,
-                          const Stencil<T>& s,
-                          std::ptrdiff_t i) {
-  const std::ptrdiff_t at = i * W;
-  a.add_difference(s.gx[i - 1], u, s.u + at - W);
-  a.add_difference(s.gx[i], u, s.u + at + W);
-  a.add_difference(s.gi_before[i], u, s.inner_before + at);
-  a.add_difference(s.gi_after[i], u, s.inner_after + at);
-  a.add_difference(s.go_before[i], u, s.outer_before + at);
-  a.add_difference(s.go_after[i], u, s.outer_after + at);
+/// f(factor, where the neighbour lies) for the six neighbours of cell i, `size` numbers a cell.
+template <class T, class F>
+HWY_INLINE void for_neighbours(const PackedStencil<T>& s, std::ptrdiff_t i, int size, F f) {
+  const std::ptrdiff_t at = i / 2 * size;
+  f(s.gx[i - 1], s.x_before + at);
+  f(s.gx[i], s.x_after + at);
+  f(s.gi_before[i], s.inner_before + at);
+  f(s.gi_after[i], s.inner_after + at);
+  f(s.go_before[i], s.outer_before + at);
+  f(s.go_after[i], s.outer_after + at);
 }
 
 template <class T, class S, int W>
@@ -141,10 +131,27 @@ struct Kernels {
     hwy::Prefetch(at + W);
   }
 
-  static void scale(T* z, const T* r, const T* inverse, int first, int nx) {
+  /// Cells of the right-hand side: all of them, or every other one side by side, or none at all.
+  struct Right {
+    const T* r;
+    int shift;
+
+    HWY_INLINE L at(std::ptrdiff_t i) const { return L::load(r + (i >> shift) * W); }
+    HWY_INLINE void ask_for(std::ptrdiff_t i) const {
+      hwy::Prefetch(r + ((i >> shift) + kAhead) * W);
+      if (shift == 0) hwy::Prefetch(r + (i + kAhead + 1) * W);
+    }
+  };
+
+  static void scale(T* z, const T* r, bool packed, const T* inverse, int first, int nx) {
+    if (r == nullptr) {
+      for (std::ptrdiff_t i = first; i < nx; i += 2) L::zero().store(z + i * W);
+      return;
+    }
+    const Right right{r, packed ? 1 : 0};
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      prefetch_pair(r + (i + kAhead) * W);
-      L a = L::load(r + i * W);
+      right.ask_for(i);
+      L a = right.at(i);
       a.scale(inverse[i]);
       a.store(z + i * W);
     }
@@ -162,9 +169,12 @@ struct Kernels {
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
       const std::ptrdiff_t up = i / w.ratio_x;
       const std::ptrdiff_t beside = i % 2 == 1 ? up + 1 : up - 1;
-      prefetch_pair(r + (i + kAhead) * W);
-      L a = L::load(r + i * W);
-      a.scale(inverse[i]);
+      L a = L::zero();
+      if (r != nullptr) {
+        prefetch_pair(r + (i + kAhead) * W);
+        a = L::load(r + i * W);
+        a.scale(inverse[i]);
+      }
       a.add(w.own[i], L::load(e.own + up * W));
       a.add(w.wx[i], L::load(e.own + beside * W));
       a.add(w.wi[i], L::load(e.inner + up * W));
@@ -173,10 +183,12 @@ struct Kernels {
     }
   }
 
-  static void sweep(T* z, const T* r, const T* inverse, const Stencil<T>& rows, int first, int nx) {
+  static void sweep(
+      T* z, const T* r, bool packed, const T* inverse, const Stencil<T>& rows, int first, int nx) {
     const Stencil<T> s = rows;  // not to be read again after every store
+    const Right right{r, packed ? 1 : 0};
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      L a = L::load(r + i * W);
+      L a = r != nullptr ? right.at(i) : L::zero();
       add_neighbours<W>(a, s, i);
       a.scale(inverse[i]);
       a.store(z + i * W);
@@ -203,32 +215,56 @@ struct Kernels {
     }
   }
 
-  static void emit(S* out, const T* z, const T* r, double* rho, double* swept, int first, int nx) {
-    if (rho == nullptr) {
-      for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(out + i * W);
-      return;
-    }
-    L even = L::zero();
-    L odd = L::zero();
-    for (std::ptrdiff_t i = 0; i < nx; ++i) {
-      const L a = L::load(z + i * W);
-      a.stream(out + i * W);
-      (i % 2 == first ? even : odd).add(a, L::load(r + i * W));
-    }
-    even.add_to(swept);
-    even.add_to(rho);
-    odd.add_to(rho);
+  static void copy(S* out, const T* z, int nx) {
+    for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(out + i * W);
   }
 
-  static void energy(const T* sink, const Stencil<T>& rows, double* sum, int first, int nx) {
+  static void emit(S* out,
+                   const T* z,
+                   const T* r,
+                   const T* sink,
+                   double* rho,
+                   double* energy,
+                   int first,
+                   int nx) {
+    L total = L::zero();
+    L sunk = L::zero();
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      const L a = L::load(z + i * W);
+      a.stream(out + i / 2 * W);
+      total.add(a, L::load(r + i / 2 * W));
+      L c = a;
+      c.scale(sink[i]);
+      sunk.add(a, c);
+    }
+    total.add_to(rho);
+    sunk.add_to(energy);
+  }
+
+  static void energy(
+      const T* sink, const T* inverse, const Stencil<T>& rows, double* sum, int first, int nx) {
     const Stencil<T> s = rows;  // not to be read again after every store
     L total = L::zero();
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      const L u = L::load(s.u + i * W);
-      L a = u;
+      L z = L::zero();
+      add_neighbours<W>(z, s, i);
+      z.scale(inverse[i]);
+      L a = z;
       a.scale(sink[i]);
-      add_flows<W>(a, u, s, i);
-      total.add(u, a);
+      total.add(z, a);
+      const auto add_face = [&](T g, const T* at) {
+        L off = z;
+        off.add(T{-1}, L::load(at + i * W));
+        L flow = off;
+        flow.scale(g);
+        total.add(off, flow);
+      };
+      add_face(s.gx[i - 1], s.u - W);
+      add_face(s.gx[i], s.u + W);
+      add_face(s.gi_before[i], s.inner_before);
+      add_face(s.gi_after[i], s.inner_after);
+      add_face(s.go_before[i], s.outer_before);
+      add_face(s.go_after[i], s.outer_after);
     }
     total.add_to(sum);
   }
@@ -262,33 +298,61 @@ struct Kernels {
     }
   }
 
+  static void relax(
+      T* t, const T* sink, const T* inverse, const PackedStencil<T>& p, int first, int nx) {
+    const PackedStencil<T> s = p;  // not to be read again after every store
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      L whole = L::zero();
+      for_neighbours(s, i, W, [&](T g, const T* at) { whole.add(g, L::load(at)); });
+      whole.scale(inverse[i]);
+      L rest = whole;
+      rest.scale(-sink[i]);
+      for_neighbours(s, i, W, [&](T g, const T* at) {
+        L off = L::load(at);
+        off.add(T{-1}, whole);
+        rest.add(g, off);
+      });
+      rest.scale(inverse[i]);
+      whole.store(t + i / 2 * 2 * W);
+      rest.store(t + (i / 2 * 2 + 1) * W);
+    }
+  }
+
   static void update(T* r,
+                     const T* p,
                      const T* sink,
-                     const Stencil<T>& rows,
+                     const PackedStencil<T>& rows,
                      const T* alpha,
                      const T* factor,
                      double* sum,
+                     int first,
                      int nx) {
-    const Stencil<T> s = rows;  // not to be read again after every store
+    const PackedStencil<T> s = rows;  // not to be read again after every store
     const L step = L::load(alpha);
     const L f = L::load(factor);
     L total = L::zero();
-    for (std::ptrdiff_t i = 0; i < nx; ++i) {
-      const L u = L::load(s.u + i * W);
+    for (std::ptrdiff_t i = first; i < nx; i += 2) {
+      const L u = L::load(p + i / 2 * W);
       L q = u;
       q.scale(sink[i]);
-      add_flows<W>(q, u, s, i);
-      L a = L::load(r + i * W);
+      for_neighbours(s, i, 2 * W, [&](T g, const T* at) {
+        L off = u;
+        off.add(T{-1}, L::load(at));
+        off.add(T{-1}, L::load(at + W));
+        q.add(g, off);
+      });
+      L a = L::load(r + i / 2 * W);
       a.subtract(step, q);
       a.scale(f);
-      a.store(r + i * W);
+      a.store(r + i / 2 * W);
       total.add(a, a);
     }
     total.add_to(sum);
   }
 
   static RowKernels<T, S> table() {
-    return {scale, prolong, sweep, restrict_row, emit, energy, direction, combine, update};
+    return {
+        scale, prolong, sweep, restrict_row, copy, emit, energy, direction, combine, relax, update};
   }
 };
 

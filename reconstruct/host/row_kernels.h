@@ -13,6 +13,7 @@ struct Half {
 /// What the sweeps do to one grid line along x. Fields hold `width` right-hand sides of a cell side
 /// by side, then the next cell; a coefficient is one number a cell, shared by all of them. Fields
 /// have a cell on either side of each row that may be read; rows outside the grid are rows of zeros.
+/// Every other cell: first, first + 2, ...; packed, they lie side by side, cell i at i / 2.
 ///
 /// K, g, D, w as in diffusion/multigrid.h. before and after: the neighbours at the lower and the
 /// higher index. T computes; S is how z lies in memory between two passes.
@@ -21,6 +22,23 @@ struct Half {
 template <class T>
 struct Stencil {
   const T* u;
+  const T* inner_before;
+  const T* inner_after;
+  const T* outer_before;
+  const T* outer_after;
+  const T* gx;
+  const T* gi_before;
+  const T* gi_after;
+  const T* go_before;
+  const T* go_after;
+};
+
+/// The six neighbours of every other cell, which are of the other colour and packed: those of cell
+/// first + 2 m at m.
+template <class T>
+struct PackedStencil {
+  const T* x_before;
+  const T* x_after;
   const T* inner_before;
   const T* inner_after;
   const T* outer_before;
@@ -57,9 +75,9 @@ enum class Direction : std::uint8_t { kRestart, kKeep, kStore, kAdd };
 
 template <class T, class S>
 struct RowKernels {
-  /// z = r / D in every other cell from `first`.
-  void (*scale)(T* z, const T* r, const T* inverse, int first, int nx);
-  /// z = r / D + P e in every other cell.
+  /// z = r / D in every other cell; zero where r is null.
+  void (*scale)(T* z, const T* r, bool packed, const T* inverse, int first, int nx);
+  /// z = r / D + P e in every other cell; a null r is zero.
   void (*prolong)(T* z,
                   const T* r,
                   const T* inverse,
@@ -67,27 +85,43 @@ struct RowKernels {
                   const CoarseRows<const S>& e,
                   int first,
                   int nx);
-  /// z = (r + sum g z) / D in every other cell; s.u is z.
-  void (*sweep)(T* z, const T* r, const T* inverse, const Stencil<T>& s, int first, int nx);
+  /// z = (r + sum g z) / D in every other cell; s.u is z, a null r is zero.
+  void (*sweep)(
+      T* z, const T* r, bool packed, const T* inverse, const Stencil<T>& s, int first, int nx);
   /// Adds P^T (sum g z) of every other cell to the rows below.
   void (*restrict_row)(
       const Stencil<T>& s, const Weights<T>& w, const CoarseRows<T>& below, int first, int nx);
-  /// out = z; rho += z . r; swept += the part of rho in every other cell from `first`. The sums may
-  /// both be null.
-  void (*emit)(S* out, const T* z, const T* r, double* rho, double* swept, int first, int nx);
-  /// sum += z . K z over every other cell.
-  void (*energy)(const T* sink, const Stencil<T>& s, double* sum, int first, int nx);
+  /// out = z.
+  void (*copy)(S* out, const T* z, int nx);
+  /// out = z, rho += z . r and energy += c z . z in every other cell, out and r packed.
+  void (*emit)(S* out,
+               const T* z,
+               const T* r,
+               const T* sink,
+               double* rho,
+               double* energy,
+               int first,
+               int nx);
+  /// sum += c z . z + sum g (z - z_near)^2 over every other cell, z = (sum g z_near) / D; s.u is z_near.
+  void (*energy)(
+      const T* sink, const T* inverse, const Stencil<T>& s, double* sum, int first, int nx);
   void (*direction)(Direction mode, T* p, const S* z, T* d, const T* alpha, const T* beta, int nx);
   /// out = z + beta p.
   void (*combine)(T* out, const S* z, const T* p, const T* beta, int nx);
-  /// r = factor (r - alpha K p), K p = c p_i + sum g (p_i - p), c = D - sum g; sum += r . r, one sum
-  /// a right-hand side; s.u is p.
+  /// In every other cell t = (sum g p) / D, and what t lacks by rounding: t[2 m] and t[2 m + 1] are
+  /// t and t' = (sum g (p - t) - c t) / D, so that K (p, t + t') vanishes there. c = D - sum g.
+  void (*relax)(
+      T* t, const T* sink, const T* inverse, const PackedStencil<T>& p, int first, int nx);
+  /// r = factor (r - alpha q) in every other cell, q = c p + sum g (p - t - t') with t as relax leaves
+  /// it; r and p packed; sum += r . r, one sum a right-hand side.
   void (*update)(T* r,
+                 const T* p,
                  const T* sink,
-                 const Stencil<T>& s,
+                 const PackedStencil<T>& t,
                  const T* alpha,
                  const T* factor,
                  double* sum,
+                 int first,
                  int nx);
 };
 

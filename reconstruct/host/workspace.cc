@@ -9,9 +9,12 @@ namespace opaline::reconstruct::host {
 namespace {
 
 constexpr std::size_t kNumbersPerThread = 16384;  // about 10 us of sweeping: worth waking somebody
-constexpr std::size_t kPlaneBytes = 192 << 10;    // ten such planes stay in 2 MiB
-constexpr std::size_t kFieldNumbers = 64 << 10;   // of a thread, in the cache
-constexpr int kHalo = 4;                          // cells, even: one more than half-sweeps reach
+constexpr std::size_t kPlaneBytes =
+    384 << 10;  // five such planes; narrower tiles compute more than they save
+constexpr std::size_t kBytesAtWork = 512 << 10;  // four planes of p, three of red cells
+constexpr int kFewestRows = 8;
+constexpr std::size_t kFieldNumbers = 64 << 10;  // of a thread, in the cache
+constexpr int kHalo = 4;                         // cells, even: one more than half-sweeps reach
 constexpr int kNarrowest = 64;
 
 template <class T>
@@ -68,27 +71,33 @@ Workspace<T, S>::Workspace(const HostGrid<T>& grid, int lanes, int threads)
   for (const HostLevel<T>& level : grid.levels) {
     const std::size_t worth = level.cell_count() * lanes / kNumbersPerThread;
     parts_.push_back(static_cast<int>(std::clamp<std::size_t>(worth, 1, threads)));
-    r.emplace_back(level.nx, level.ni, level.no, lanes);
-    z.emplace_back(level.nx, level.ni, level.no, lanes);
+    const int nx = r.empty() ? half_line(level.nx) : level.nx;
+    r.emplace_back(nx, level.ni, level.no, lanes);
+    z.emplace_back(nx, level.ni, level.no, lanes);
     tiles.push_back(tiles_of(level.nx, level.ni, sizeof(T) * lanes));
     auto& each = scratch.emplace_back();
     for (int thread = 0; thread < parts_.back(); ++thread)
       each.push_back(make_scratch<T>(tiles.back(), lanes));
   }
   const HostLevel<T>& finest = grid.levels.front();
-  for (HostField<T>* field : {&p, &d})
-    *field = HostField<T>(finest.nx, finest.ni, finest.no, lanes);
-  for (int thread = 0; thread < parts_.front(); ++thread)
-    halo.emplace_back(finest.nx, finest.ni, 2, lanes);
-  const std::size_t line = padded(finest.nx) * lanes;
+  const int half = half_line(finest.nx);
+  for (HostField<T>* field : {&p, &d}) *field = HostField<T>(half, finest.ni, finest.no, lanes);
+  const std::size_t at_work = 10 * p.row_size() * sizeof(T);
+  rows_at_work_ = std::max(kFewestRows, static_cast<int>(kBytesAtWork / at_work) / 2 * 2);
+  for (int thread = 0; thread < parts_.front(); ++thread) {
+    halo.emplace_back(half, finest.ni, 4, lanes);
+    relaxed.emplace_back(
+        half, std::min(finest.ni, rows_at_work_ + kRelaxedAnew), kRelaxedPlanes, 2 * lanes);
+  }
+  const std::size_t line = padded(half) * lanes;
   fields.assign(parts_.front(),
-                std::vector<T>(line * std::max<std::size_t>(2, kFieldNumbers / line), T{0}));
-  const std::size_t row = (static_cast<std::size_t>(finest.nx) + 3) * lanes;
+                std::vector<T>(line * std::max<std::size_t>(3, kFieldNumbers / line), T{0}));
+  const std::size_t row = (static_cast<std::size_t>(finest.nx) + 5) * lanes;
   zeros.assign(row, T{0});
   stored_zeros.assign(row, S{});
   const std::size_t sums =
       static_cast<std::size_t>(std::max(finest.ni, finest.no)) * tiles.front().size() * lanes;
-  for (auto* each : {&rho_sums, &swept_sums, &norm_sums}) each->assign(sums, 0.0);
+  for (auto* each : {&rho_sums, &energy_sums, &norm_sums}) each->assign(sums, 0.0);
 }
 
 template <class T, class S>

@@ -64,7 +64,11 @@ struct Scratch {
 };
 constexpr int kRing = 5;
 
-/// All fields of one group of right-hand sides, kept from solve to solve.
+/// Cells of one colour in a line of nx, at most.
+constexpr int half_line(int nx) { return (nx + 1) / 2; }
+
+/// All fields of one group of right-hand sides, kept from solve to solve. Those of level 0 have the
+/// black cells only, side by side: cell i of a line at i / 2.
 template <class T, class S>
 struct Workspace {
   Workspace(const HostGrid<T>& grid, int lanes, int threads);
@@ -73,22 +77,31 @@ struct Workspace {
 
   /// How many threads share a level: fewer where there is little to do.
   int parts(int level) const { return parts_[level]; }
+  /// Lines of p that are updated while they are in the cache.
+  int rows_at_work() const { return rows_at_work_; }
 
-  int width;                                            ///< 1, 4, 8 or 16
-  std::vector<HostField<T>> r;                          ///< one a level
-  std::vector<HostField<S>> z;                          ///< one a level
-  HostField<T> p, d;                                    ///< level 0
-  std::vector<std::vector<Tile>> tiles;                 ///< [level]
-  std::vector<std::vector<Scratch<T>>> scratch;         ///< [level][thread]
-  std::vector<HostField<T>> halo;                       ///< [thread]: p beyond the slab, two planes
-  std::vector<std::vector<T>> fields;                   ///< [thread]: some lines, field by field
-  std::vector<T> zeros;                                 ///< a row outside the grid
-  std::vector<S> stored_zeros;                          ///< the same of z
-  std::vector<double> rho_sums, swept_sums, norm_sums;  ///< [plane][tile][width]
+  int width;                                     ///< 1, 4, 8 or 16
+  std::vector<HostField<T>> r;                   ///< one a level
+  std::vector<HostField<S>> z;                   ///< one a level
+  HostField<T> p, d;                             ///< level 0
+  std::vector<std::vector<Tile>> tiles;          ///< [level]
+  std::vector<std::vector<Scratch<T>>> scratch;  ///< [level][thread]
+  std::vector<HostField<T>> halo;                ///< [thread]: p beyond the slab, four planes
+  std::vector<HostField<T>> relaxed;   ///< [thread]: red cells while p is at work, kRelaxedPlanes
+  std::vector<std::vector<T>> fields;  ///< [thread]: some lines, field by field
+  std::vector<T> zeros;                ///< a row outside the grid, after two cells
+  std::vector<S> stored_zeros;         ///< the same of z
+  std::vector<double> rho_sums, energy_sums, norm_sums;  ///< [plane][tile][width]
 
  private:
   std::vector<std::array<int, 3>> sizes_;
   std::vector<int> parts_;
+  int rows_at_work_ = 0;
 };
+
+/// Lines before a block of the update that it relaxes anew, and planes of relaxed cells kept. Both are even, as
+/// rows_at_work() is: a row of `relaxed` always holds cells of one parity, and what follows a short one stays zero.
+constexpr int kRelaxedAnew = 4;
+constexpr int kRelaxedPlanes = 4;
 
 }  // namespace opaline::reconstruct::host
