@@ -11,8 +11,8 @@ namespace opaline::capture {
 
 /// A black frame as white light tells it.
 struct ToldBlack {
-  Image<float>
-      electrons;   ///< 3 channels; NaN at pixels that do not see the sample, or where white clips
+  /// 3 channels; NaN at pixels that do not see the sample, or where white clips.
+  Image<float> electrons;
   int blacks = 1;  ///< the mean of so many black frames would be known as well
 };
 

@@ -54,7 +54,7 @@ struct Group {
 ///
 ///   delta = z . S z = sum c z^2 + sum over faces g (z_r - z_b)^2,
 ///
-/// which cannot cancel, and rounding of z_r adds to in second order only, for there it is least; then
+/// which cannot cancel, and which rounding of z_r changes in second order only, for there it is least; then
 ///
 ///   p . S p = delta - beta^2 p_before . S p_before          (Chronopoulos & Gear 1989, J. Comput.
 ///                                                            Appl. Math. 25, section 3)

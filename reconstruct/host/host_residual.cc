@@ -6,8 +6,8 @@
 namespace opaline::reconstruct::host {
 namespace {
 
-constexpr std::size_t kBytesAtWork =
-    2560 << 10;  // four planes of x, one of all else; fewer lines would be taken again
+// Four planes of x, one of all else. More than a second-level cache: lines taken again cost more.
+constexpr std::size_t kBytesAtWork = 2560 << 10;
 constexpr std::size_t kFewestRows = 4;
 constexpr std::size_t kLag = 2;  // lines by which the residual lags x
 

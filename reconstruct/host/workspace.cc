@@ -9,8 +9,8 @@ namespace opaline::reconstruct::host {
 namespace {
 
 constexpr std::size_t kNumbersPerThread = 16384;  // about 10 us of sweeping: worth waking somebody
-constexpr std::size_t kPlaneBytes =
-    384 << 10;  // five such planes; narrower tiles compute more than they save
+// Of a tile; five such planes are at work. Narrower tiles compute more around themselves than they save.
+constexpr std::size_t kPlaneBytes = 384 << 10;
 constexpr std::size_t kBytesAtWork = 512 << 10;  // four planes of p, three of red cells
 constexpr int kFewestRows = 8;
 constexpr std::size_t kFieldNumbers = 64 << 10;  // of a thread, in the cache
