@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
@@ -24,6 +25,19 @@ struct HolderScene {
 };
 Result<void> validate(const HolderScene& holder);
 
+/// What a holder adds its own light to.
+class HeldSample : public LightPath {
+ public:
+  StationLight dark() const override { return sample_.dark(); }
+  int patches_x() const override { return sample_.patches_x(); }
+  int patches_y() const override { return sample_.patches_y(); }
+  std::string scene() const override { return sample_.scene(); }
+
+ protected:
+  explicit HeldSample(StationOptics sample) : sample_(std::move(sample)) {}
+  StationOptics sample_;
+};
+
 /// A sample in its holder, lit from behind. The projector's light that falls beside the sample, on average over there, spreads in the acrylic and leaves
 /// it evenly: a camera pixel that sees the board's plane outside the sample's seen face has
 ///
@@ -33,7 +47,7 @@ Result<void> validate(const HolderScene& holder);
 /// The sample sheds no light on it, nor it on the sample.
 ///
 /// Threads: const, so any number at a time.
-class HolderOptics : public LightPath {
+class HolderOptics : public HeldSample {
  public:
   HolderOptics(const CameraOptics& camera,
                const ProjectorOptics& projector,
@@ -42,15 +56,10 @@ class HolderOptics : public LightPath {
                const SurfaceOptions& surface = {});
 
   StationLight light(const Image<std::uint8_t>& codes) const override;
-  StationLight dark() const override { return sample_.dark(); }
-  int patches_x() const override { return sample_.patches_x(); }
-  int patches_y() const override { return sample_.patches_y(); }
-  std::string scene() const override { return sample_.scene(); }
 
  private:
   Rgb beside(const Image<std::uint8_t>& codes) const;
 
-  StationOptics sample_;
   CameraOptics camera_;
   ProjectorOptics projector_;
   double glow_;
@@ -63,7 +72,7 @@ class HolderOptics : public LightPath {
 /// Holder and sample shed no light on each other.
 ///
 /// Threads: const, so any number at a time.
-class LitHolderOptics : public LightPath {
+class LitHolderOptics : public HeldSample {
  public:
   LitHolderOptics(const CameraOptics& camera,
                   const ProjectorOptics& projector,
@@ -72,13 +81,8 @@ class LitHolderOptics : public LightPath {
                   const SurfaceOptions& surface = {});
 
   StationLight light(const Image<std::uint8_t>& codes) const override;
-  StationLight dark() const override { return sample_.dark(); }
-  int patches_x() const override { return sample_.patches_x(); }
-  int patches_y() const override { return sample_.patches_y(); }
-  std::string scene() const override { return sample_.scene(); }
 
  private:
-  StationOptics sample_;
   BoardOptics holder_;
 };
 
