@@ -150,6 +150,13 @@ Result<GradientSequence::Frames> GradientSequence::take(std::size_t n,
                     name,
                     seconds((*devices)->ladder().back()),
                     name));
+  if (taken->unsteady)
+    return unavailable(
+        fmt::format("{}, taken {} times: {}: fix object and camera, let the lamps warm "
+                    "up, and start again",
+                    name,
+                    taken->retaken + 1,
+                    taken->unsteady->message));
   summary_.retaken += taken->retaken;
   if (auto saved = store_.save(name, pattern, taken->frames); !saved) return saved.error();
   ++summary_.taken;

@@ -29,13 +29,14 @@ double weight_of(double share) {
   return std::clamp((kNoWeight - share) / (kNoWeight - kFullWeight), 0.0, 1.0);
 }
 
-// Of one frame, around `mean` electrons: shot noise, read noise, and quantisation to whole codes.
+}  // namespace
+
 double noise_variance(const CameraCalibration& camera, double mean, double per_code) {
   const double read = camera.read_noise_electrons;
   return std::max(mean, 0.0) + read * read + per_code * per_code / 12.0;
 }
 
-std::vector<Electrons> electrons_table(const CameraCalibration& camera) {
+std::vector<Electrons> electrons_by_code(const CameraCalibration& camera) {
   std::vector<Electrons> table(static_cast<std::size_t>(1) << 16);
   const int last = static_cast<int>(camera.max_code());
   for (int code = 0; code < static_cast<int>(table.size()); ++code) {
@@ -43,8 +44,6 @@ std::vector<Electrons> electrons_table(const CameraCalibration& camera) {
   }
   return table;
 }
-
-}  // namespace
 
 BlackSample black_of(const ExposurePair& pair,
                      std::size_t sample,
@@ -67,7 +66,7 @@ HdrMerge::HdrMerge(const CameraCalibration& camera, Image<std::uint8_t> hot)
     : camera_(camera),
       hot_(std::move(hot)),
       vignetting_(camera_vignetting(camera)),
-      electrons_(electrons_table(camera)),
+      electrons_(electrons_by_code(camera)),
       clipping_code_(clipping_code(camera)),
       clipping_electrons_(electrons_from_code(camera, clipping_code_).signal) {
   ENSURE(hot_.width() == camera.model.width && hot_.height() == camera.model.height);

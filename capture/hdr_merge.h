@@ -24,6 +24,12 @@ struct ExposurePair {
   std::span<const Image<std::uint16_t>* const> more_black = {};
   const ToldBlack* told = nullptr;  ///< instead of all these, where it tells; outlives the pair
 };
+/// Of one sample of `mean` electrons, light and leak, where neighbouring codes lie `per_code` apart: shot noise, read noise, and
+/// quantisation to whole codes; electrons^2.
+double noise_variance(const CameraCalibration& camera, double mean, double per_code);
+/// electrons_from_code() of every 16-bit code.
+std::vector<Electrons> electrons_by_code(const CameraCalibration& camera);
+
 /// Black of one exposure, and the mean of how many frames would be known as well.
 struct BlackSample {
   Electrons electrons;

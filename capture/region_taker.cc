@@ -17,6 +17,10 @@ using std::chrono::nanoseconds;
 constexpr nanoseconds kReplugPatience = std::chrono::seconds(10);
 constexpr nanoseconds kReplugPause = std::chrono::milliseconds(200);
 
+double middle_of(const Frame& frame) {
+  return seconds(frame.start) + 0.5 * seconds(frame.exposure);
+}
+
 bool can_retry(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kTimeout || code == ErrorCode::kBusy;
 }
@@ -42,7 +46,7 @@ std::optional<std::size_t> find_black_frame(std::span<const FrameLight> lights,
 }
 
 RegionTaker::RegionTaker(const Station& station, const Settings& settings, EventSink& events)
-    : station_(station), settings_(settings), events_(events) {}
+    : station_(station), settings_(settings), events_(events), steadiness_(settings.camera) {}
 
 RegionTaker::~RegionTaker() {
   if (auto dark = station_.projector.dark(); !dark) {
@@ -116,14 +120,23 @@ Result<void> RegionTaker::recover(std::stop_token stop) {
 Result<TakenLight> RegionTaker::with_retries(const std::string& name,
                                              const AttemptFunction& attempt,
                                              std::stop_token stop) {
+  steadiness_.next_light();
   for (int tries = 0;; ++tries) {
     Attempt taken = attempt();
-    if (taken && (taken->lit || tries == settings_.options.retries)) {
+    if (taken && taken->unsteady) {
+      if (auto noted = note_unsteady(name, tries + 1, *taken->unsteady); !noted)
+        return noted.error();
+    }
+    const bool good = taken && taken->lit && !taken->unsteady;
+    if (good || (taken && tries == settings_.options.retries)) {
       taken->retaken = tries;
       return *std::move(taken);
     }
-    const Failure failure =
-        taken ? Failure{unavailable("no light in any exposure"), "black"} : taken.error();
+    const Failure failure = !taken ? taken.error()
+                            : taken->unsteady
+                                ? Failure{unavailable(taken->unsteady->message),
+                                          std::string(to_string(taken->unsteady->kind))}
+                                : Failure{unavailable("no light in any exposure"), "black"};
     if (stop.stop_requested()) return cancelled(fmt::format("{}: stopped", name));
     if (!can_retry(failure.error.code)) return failure.error.in(name);
     if (tries >= settings_.options.retries) {
@@ -146,6 +159,52 @@ Result<TakenLight> RegionTaker::with_retries(const std::string& name,
       log::warning("{}: {}", name, back.error().message);
     }
   }
+}
+
+Result<void> RegionTaker::check_place(const std::string& name,
+                                      const TakenLight& taken,
+                                      const BlackFrames& black) const {
+  const auto now = std::ranges::find(
+      taken.frames, before_motion_->exposure_index, &CapturedFrame::exposure_index);
+  if (now == taken.frames.end()) return ok();
+  const auto first = black.pair(*before_motion_);
+  const auto second = black.pair(*now);
+  if (!first || !second) return ok();
+  const std::size_t index = now->exposure_index;
+  const auto moved = steadiness_.moved({*first, index, middle_of(before_motion_->frame)},
+                                       {*second, index, middle_of(now->frame)},
+                                       black.footprint());
+  if (!moved) return ok();
+  const std::string message = fmt::format(
+      "{}: what the camera sees has moved and stays there ({:.2g} % of the light, {:.2g} px): "
+      "lights "
+      "before do not go with those to come. Put it back and start again, or start a new session",
+      name,
+      100.0 * moved->size,
+      moved->shift_px);
+  const auto noted = events_.fact("sample.moved",
+                                  {{"region", name},
+                                   {"size", moved->size},
+                                   {"shift_px", moved->shift_px},
+                                   {"message", message}});
+  return noted ? Result<void>(unavailable(message)) : noted;
+}
+
+Result<void> RegionTaker::note_unsteady(const std::string& name,
+                                        int attempt,
+                                        const UnsteadyLight& unsteady) {
+  nlohmann::json fact{{"region", name},
+                      {"attempt", attempt},
+                      {"kind", to_string(unsteady.kind)},
+                      {"size", unsteady.size},
+                      {"deviation", unsteady.deviation},
+                      {"message", fmt::format("{}: {}", name, unsteady.message)}};
+  if (unsteady.shift_px > 0.0) fact["shift_px"] = unsteady.shift_px;
+  if (unsteady.where) {
+    fact["x"] = unsteady.where->first;
+    fact["y"] = unsteady.where->second;
+  }
+  return events_.fact("region.unsteady", fact);
 }
 
 std::optional<RegionTaker::Failure> RegionTaker::show(const drivers::Pattern& pattern,
@@ -212,6 +271,7 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
   taken.frames.reserve(kMaxExposures);  // pairs point into it
   std::vector<FrameLight> lights;
   std::vector<double> times;
+  std::vector<TimedExposure> exposures;
   const std::unique_ptr<ExposureChooser> chooser =
       choose ? choose()
              : std::make_unique<BracketChooser>(settings_.options.exposures, ladder_.size());
@@ -229,6 +289,7 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
     lights.push_back(measure_light(
         settings_.camera, *pair, black.footprint(), settings_.options.exposures.dark_quantile));
     times.push_back(pair->light_seconds);
+    exposures.push_back({*pair, *index, middle_of(taken.frames.back().frame)});
     chooser->add(*index, *pair, lights.back());
     taken.lit = taken.lit || lights.back().lit();
   }
@@ -238,6 +299,17 @@ RegionTaker::Attempt RegionTaker::attempt_light(const drivers::Pattern& pattern,
         Failure{unavailable(fmt::format(
                     "exposure of {:.4g} s: black frame: other exposures show light", asked)),
                 std::string(to_string(FrameFault::kBlack))});
+  }
+  if (taken.lit) {
+    auto verdict = steadiness_.judge(exposures, black.footprint());
+    taken.unsteady = std::move(verdict.unsteady);
+    const bool motion = taken.unsteady && taken.unsteady->kind == Unsteadiness::kMotion;
+    if (motion && !before_motion_) before_motion_ = taken.frames.front();
+    if (!verdict.disagreement.empty()) {
+      log::warning("{}", verdict.disagreement);
+      const auto noted = events_.fact("calibration.warning", {{"message", verdict.disagreement}});
+      if (!noted) return tl::unexpected(Failure{noted.error(), "events"});
+    }
   }
   std::ranges::stable_sort(taken.frames, {}, &CapturedFrame::exposure_index);
   return taken;
@@ -263,8 +335,12 @@ Result<TakenLight> RegionTaker::take_light(const std::string& name,
                                            const Watcher& watcher,
                                            std::stop_token stop,
                                            const ChooseExposures& choose) {
-  return with_retries(
+  before_motion_.reset();
+  auto taken = with_retries(
       name, [&] { return attempt_light(pattern, black, watcher, stop, choose); }, stop);
+  if (!taken || !before_motion_ || taken->unsteady) return taken;
+  if (auto place = check_place(name, *taken, black); !place) return place.error();
+  return taken;
 }
 
 }  // namespace opaline::capture

@@ -22,6 +22,7 @@
 #include "capture/frame_store.h"
 #include "capture/hdr_merge.h"
 #include "capture/station.h"
+#include "capture/steadiness.h"
 
 namespace opaline::capture {
 
@@ -30,11 +31,15 @@ struct TakenLight {
   std::vector<CapturedFrame> frames;
   bool lit = false;
   int retaken = 0;  ///< how often frames were bad and the light was taken again
+  /// What changed among its exposures the last time, when retries are used up: not to be measured by.
+  std::optional<UnsteadyLight> unsteady = std::nullopt;
 };
 
 /// Takes one light after another: shows it, lets it settle, exposes, checks every frame. A light
-/// with a bad frame is taken again from its first exposure, up to the retries allowed; each time is
-/// a fact, "region.retaken" {region, attempt, fault, message}. Devices that were lost are closed
+/// with a bad frame, or whose exposures do not agree with each other (SteadinessCheck), is taken again from its first exposure, up to the
+/// retries allowed; each time is a fact, "region.retaken" {region, attempt, fault, message}, and the latter also "region.unsteady" {region, attempt, kind, size,
+/// deviation, shift_px or x and y, message}. Where it has moved for good, by the first exposures of an unsteady and a steady take, lights before do not go
+/// with those to come: "sample.moved" {region, size, shift_px, message}, and kUnavailable. Exposures that disagree the same way each time are a "calibration.warning" {message}. Devices that were lost are closed
 /// and opened again between the tries, until they are back or ten seconds are over; a camera that
 /// is not the calibrated one ends it with kInvalidArgument.
 ///
@@ -85,6 +90,10 @@ class RegionTaker {
     Error error;
     std::string fault;
   };
+  Result<void> check_place(const std::string& name,
+                           const TakenLight& taken,
+                           const BlackFrames& black) const;
+  Result<void> note_unsteady(const std::string& name, int attempt, const UnsteadyLight& unsteady);
   using Attempt = tl::expected<TakenLight, Failure>;
   using AttemptFunction = std::function<Attempt()>;
   using CaptureResult = tl::expected<CapturedFrame, Failure>;
@@ -118,6 +127,8 @@ class RegionTaker {
   drivers::ProjectorInfo projector_;
   drivers::CameraInfo camera_;
   std::optional<FrameCheck> check_;
+  SteadinessCheck steadiness_;
+  std::optional<CapturedFrame> before_motion_;  ///< of a light in which something moved: its first
   std::vector<std::chrono::nanoseconds> ladder_;
   std::chrono::nanoseconds whole_ladder_{};
 };

@@ -62,6 +62,8 @@ class Sequence {
   struct Frames {
     std::vector<CapturedFrame> frames;
     bool lit = true;
+    /// Why they cannot be used; not stored, so taken again by another run.
+    std::string unsteady = {};
   };
   Result<void> prepare(std::stop_token stop);
   Result<void> note_plan();
@@ -229,6 +231,8 @@ Result<Sequence::Frames> Sequence::take(const Light& light, std::stop_token stop
   if (!taken->lit) {
     if (auto lamp = confirm_lamp(light.name, stop); !lamp) return lamp.error();
   }
+  if (taken->unsteady)
+    return Frames{std::move(taken->frames), true, std::move(taken->unsteady->message)};
   if (auto saved = store_.save(light.name, light.pattern, taken->frames); !saved)
     return saved.error();
   ++summary_.taken;
@@ -284,8 +288,9 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
   const fs::path path = work_.directory / "hdr" / (light.name + ".exr");
   if (auto written = write_hdr(work_.files, path, hdr); !written) return written;
   const SurfaceRadiance surface = map_.apply(hdr, task_.options.min_coverage);
-  Illumination measured = illumination_of(
-      light, surface, task_.sample, task_.options.direct_light_margin_mm, found->lit);
+  const bool usable = found->lit && found->unsteady.empty();
+  Illumination measured =
+      illumination_of(light, surface, task_.sample, task_.options.direct_light_margin_mm, usable);
   if (light.uniform) {
     dataset_.uniform = std::move(measured);
   } else {
@@ -296,6 +301,14 @@ Result<void> Sequence::do_light(const Light& light, std::stop_token stop) {
         light,
         "it is black at every exposure though the lamp works: is the sample opaque "
         "there, or something in the light's way?");
+  }
+  if (!found->unsteady.empty()) {
+    return note_unusable(
+        light,
+        fmt::format("its exposures do not agree, {} times: {}; keep hands and "
+                    "room light away, fix sample, camera and lamp, and start again",
+                    task_.options.retries + 1,
+                    found->unsteady));
   }
   return any_set(surface.mask) ? ok() : note_unusable(light, why_masked(hdr));
 }

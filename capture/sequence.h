@@ -47,12 +47,13 @@ struct CaptureSummary {
 /// frames. The lamp is dark when it returns.
 ///
 /// A light without one usable cell, clipped even at the shortest exposure or seen by too few good
-/// pixels, or one that is black while the lamp is seen to work, is masked and the session goes on,
+/// pixels, one that is black while the lamp is seen to work, or one whose exposures do not agree with each other however often it is taken
+/// (SteadinessCheck), is masked and the session goes on,
 /// until fewer than `usable_share` of the regions can be used. A dead lamp stops it: when a light
 /// and the whole picture lit are both black, at every retry. Lights that were taken at other exposures than the black frames,
 /// since options or devices have changed, are taken again.
 ///
-/// Facts: capture.planned, region.captured, region.retaken, region.damaged, region.unusable,
+/// Facts: capture.planned, region.captured, region.unsteady, region.retaken, region.damaged, region.unusable,
 /// capture.completed. Progress: step "capture", detail {light, lights, region, exposure}:
 /// "region_1_2", the fifth of 24, exposed for "0.5 s".
 /// Errors: kInvalidArgument for options, calibration or geometry, for a camera that is not the

@@ -31,11 +31,6 @@ constexpr double kFewestBlocks = 4.0;
 constexpr double kCellPixels = 16.0;
 constexpr double kMostBlacks = 1000.0;
 
-double noise_variance(const CameraCalibration& camera, double electrons, double per_code) {
-  const double read = camera.read_noise_electrons;
-  return std::max(electrons, 0.0) + read * read + per_code * per_code / 12.0;
-}
-
 /// The white picture's light, electrons a second, and its variance; NaN where it clips.
 struct White {
   Image<float> rate;

@@ -31,8 +31,8 @@ std::size_t first_unfinished(const SessionHistory& history) {
 
 // Every other fact is work done that the next run need not do again.
 bool is_fruit(std::string_view type) {
-  constexpr std::array<std::string_view, 3> kNone{
-      "capture.planned", "region.damaged", "region.retaken"};
+  constexpr std::array<std::string_view, 5> kNone{
+      "capture.planned", "region.damaged", "region.retaken", "region.unsteady", "sample.moved"};
   return std::ranges::find(kNone, type) == kNone.end();
 }
 

@@ -30,6 +30,9 @@ constexpr std::array kNames{
     FaultName{
         FaultKind::kWheelBeat, "wheel_beat", "the colour wheel turns a tenth faster than said"},
     FaultName{FaultKind::kMovedBoard, "moved_board", "the calibration board is knocked against"},
+    FaultName{FaultKind::kMovedSample, "moved_sample", "the sample moves by 1.5 pixels, for good"},
+    FaultName{FaultKind::kShadow, "shadow", "something dims a part of the picture by a fifth"},
+    FaultName{FaultKind::kFadingLamp, "fading_lamp", "the lamp loses 2 %, for good"},
     FaultName{FaultKind::kUnreportedExposure,
               "unreported_exposure",
               "1 s and more last a tenth longer, unsaid"},

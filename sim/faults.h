@@ -34,6 +34,9 @@ enum class FaultKind : std::uint8_t {
   kFlicker,          ///< the lamp is 3 % off in this exposure, one way or the other
   kWheelBeat,        ///< the colour wheel turns a tenth faster than it says during this exposure
   kMovedBoard,  ///< a calibration board is knocked against before the projector shows the pattern
+  kMovedSample,  ///< what the camera sees is moved by a pixel and a half before this exposure, and stays there
+  kShadow,  ///< something is in the way of a tenth of the picture, a bit below its middle, during this exposure, and takes a fifth of its light
+  kFadingLamp,  ///< the lamp loses 2 % from this exposure on: so many times, exposure after exposure
   kUnreportedExposure,  ///< an exposure of a second or more lasts a tenth longer than the frame says
 };
 

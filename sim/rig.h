@@ -100,6 +100,8 @@ class Rig : public RigPort {
   std::uint64_t exposing_session_ = 0;  ///< 0: no exposure under way
   std::uint64_t trigger_count_ = 0;
   std::uint64_t exposures_ = 0;
+  double lamp_ = 1.0;      ///< what is left of its light
+  double moved_px_ = 0.0;  ///< what is seen, to the right
   std::optional<Frame> last_frame_;
 };
 

@@ -22,6 +22,11 @@ constexpr nanoseconds kLong = std::chrono::seconds(1);
 constexpr double kFlickers = 0.03;
 constexpr double kFastTurn = 0.9;
 constexpr std::uint16_t kDriftedCodes = 24;
+constexpr double kMovedPx = 1.5;
+constexpr double kFades = 0.02;
+constexpr double kShadowLeaves = 0.8;  // of the light,
+constexpr double kShadowFrom = 0.45;   // in the middle of the picture, of its width and height,
+constexpr double kShadowTo = 0.75;     // up to here
 
 /// For how long each channel is lit at full power by a wheel of which a turn takes `turn` seconds.
 Rgb lit_seconds(const ProjectorOptics& projector,
@@ -31,6 +36,34 @@ Rgb lit_seconds(const ProjectorOptics& projector,
   const double all = stretch.to_seconds - stretch.from_seconds;
   if (!projector.color_wheel) return {all, all, all};
   return wheel_lit_seconds(turn, phase + stretch.from_seconds, phase + stretch.to_seconds);
+}
+
+/// Moves a picture to the right by up to two pixels; what comes in from the left is its edge.
+Image<float> moved(const Image<float>& picture, double px) {
+  Image<float> result(picture.width(), picture.height(), picture.channels());
+  const int whole = static_cast<int>(std::floor(px));
+  const auto share = static_cast<float>(px - whole);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const int from = std::max(0, x - whole);
+      const int left = std::max(0, from - 1);
+      for (int c = 0; c < picture.channels(); ++c)
+        result.at(x, y, c) =
+            (1.0F - share) * picture.at(from, y, c) + share * picture.at(left, y, c);
+    }
+  }
+  return result;
+}
+
+void cast_shadow(Image<float>& picture) {
+  const auto in = [](int i, int size) { return i >= kShadowFrom * size && i < kShadowTo * size; };
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      if (!in(x, picture.width()) || !in(y, picture.height())) continue;
+      for (int c = 0; c < picture.channels(); ++c)
+        picture.at(x, y, c) *= static_cast<float>(kShadowLeaves);
+    }
+  }
 }
 
 void swap_red_and_blue(Image<std::uint16_t>& pixels) {
@@ -60,6 +93,8 @@ struct Rig::Picture {
   double turn = 1.0;  ///< of the wheel, over what it says
   std::uint16_t drift = 0;
   bool swapped = false;
+  double moved_px = 0.0;
+  bool shadow = false;
 };
 
 Result<Rig::Exposure> Rig::trigger(std::uint64_t session,
@@ -162,7 +197,12 @@ Rig::Picture Rig::disturbed(std::vector<LightStretch> lights, std::uint64_t id) 
   Picture picture{std::move(lights)};
   if (plan_.strikes(FaultKind::kBlackFrame, id)) picture.lights = {};
   if (plan_.strikes(FaultKind::kFlicker, id))
-    picture.brightness += exposures_ % 2 == 0 ? kFlickers : -kFlickers;
+    picture.brightness += mix(options_.seed, exposures_) % 2 == 0 ? kFlickers : -kFlickers;
+  if (plan_.strikes(FaultKind::kFadingLamp, id)) lamp_ *= 1.0 - kFades;
+  picture.brightness *= lamp_;
+  if (plan_.strikes(FaultKind::kMovedSample, id)) moved_px_ = kMovedPx;
+  picture.moved_px = moved_px_;
+  picture.shadow = plan_.strikes(FaultKind::kShadow, id);
   if (plan_.strikes(FaultKind::kWheelBeat, id)) picture.turn = kFastTurn;
   if (plan_.strikes(FaultKind::kBlackDrift, id)) picture.drift = kDriftedCodes;
   picture.swapped = plan_.strikes(FaultKind::kSwappedChannels, id);
@@ -183,6 +223,8 @@ Image<std::uint16_t> Rig::picture(const Exposure& exposure, const Picture& pictu
       sum.samples()[i] += static_cast<float>(picture.brightness * lit[i % 3]) * radiance[i];
     }
   }
+  if (picture.moved_px > 0.0) sum = moved(sum, picture.moved_px);
+  if (picture.shadow) cast_shadow(sum);
   Image<std::uint16_t> codes = sensor_.read(sum, seconds(exposure.open), exposure.key);
   const double most = options_.camera.max_code();
   for (std::uint16_t& code : codes.samples())

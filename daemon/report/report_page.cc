@@ -189,9 +189,13 @@ void add_capture(const ReportData& data, Page& page) {
   page.begin("capture", "Captured HDR pictures");
   page.add(html::paragraph(fmt::format(
       "{} lights, each picture to its own scale; pixels saturated even in the shortest exposure "
-      "are magenta. Lights taken again after a bad frame: {}.",
+      "are magenta. Lights taken again after a bad frame: {}. Takes whose exposures did not agree "
+      "with each other, none of them used: {}.",
       data.contacts.size(),
-      data.facts.regions_retaken)));
+      data.facts.regions_retaken,
+      data.facts.unsteady.size())));
+  for (const std::string& what : data.facts.unsteady)
+    page.add(html::warning("Not steady: " + what));
   for (const std::string& why : data.facts.unusable) {
     page.add(html::warning("Not usable: " + why));
   }

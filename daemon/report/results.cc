@@ -69,6 +69,7 @@ Json capture_json(const ReportData& data) {
           {"job_runs", data.facts.runs},
           {"regions_captured", data.facts.regions_captured},
           {"regions_retaken", data.facts.regions_retaken},
+          {"unsteady", data.facts.unsteady},
           {"unusable", data.facts.unusable},
           {"lights", std::move(lights)}};
 }

@@ -16,6 +16,8 @@ void count(const Event& event, SessionFacts& facts) {
   if (event.type == "job.started" && ++facts.runs == 1) facts.begun = event.time;
   if (event.type == "region.captured") ++facts.regions_captured;
   if (event.type == "region.retaken") ++facts.regions_retaken;
+  if (event.type == "region.unsteady" || event.type == "sample.moved")
+    facts.unsteady.push_back(text_in(event, "message"));
   if (event.type == "calibration.used") facts.calibration = text_in(event, "message");
   if (event.type == "placement.measured") {
     if (!facts.calibration.empty()) facts.calibration += "; ";

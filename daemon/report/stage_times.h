@@ -17,6 +17,7 @@ struct SessionFacts {
   int runs = 0;                                 ///< of jobs, restarts included
   int regions_captured = 0;
   int regions_retaken = 0;
+  std::vector<std::string> unsteady;              ///< takes of lights whose exposures did not agree
   std::string calibration;                        ///< that was used; empty: the rig file's
   std::vector<std::string> calibration_warnings;  ///< what the station said against it
   std::vector<std::string> unusable;              ///< lights that could not be used, and why

@@ -141,6 +141,69 @@ TEST_F(WholeSession, GoesFromAConfigurationToItsReportLitFromInFront) {
   EXPECT_LT(margin, 4.0);
 }
 
+/// A session on the tiny station, of which one light's second exposure is disturbed in so many takes.
+class UnsteadySession : public WholeSession {
+ protected:
+  nlohmann::json results_with(const std::string& fault, int takes) {
+    std::string config = read_text(in_bed("session.toml")).value();
+    config.insert(config.find("[reconstruction]"), "[capture.exposures]\nmode = \"fixed\"\n");
+    EXPECT_TRUE(write_whole(system_files(), in_bed("fixed.toml"), config));
+    const auto rig = spawn({"opaline-rig",
+                            "serve",
+                            "--config",
+                            in_bed("rig.toml").string(),
+                            "--socket",
+                            bed_->rig_socket().string()},
+                           "rig.out");
+    EXPECT_TRUE(eventually([&] { return says(*rig, "ready"); })) << rig->output();
+    for (int take = 0; take < takes; ++take) {  // each of five exposures
+      const auto armed = spawn({"opaline-rig",
+                                "fault",
+                                bed_->rig_socket().string(),
+                                fault,
+                                "--pattern",
+                                "17",
+                                "--skip",
+                                take == 0 ? "1" : "4"},
+                               "fault.out");
+      EXPECT_EQ(armed->wait(), 0) << armed->output();
+    }
+    const auto run = spawn({"opaline",
+                            "run",
+                            "--local",
+                            "--sessions",
+                            in_bed("sessions").string(),
+                            in_bed("fixed.toml").string()},
+                           "opaline.out");
+    EXPECT_EQ(run->wait(), 0) << run->output();
+    output_ = run->output();
+    const auto text = read_text(session() / "results.json");
+    EXPECT_TRUE(text) << text.error().message;
+    return text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
+  }
+  std::string report() const { return read_text(session() / "report.html").value_or(""); }
+  std::string output_;
+};
+
+TEST_F(UnsteadySession, NamesAShadowThatFellOnOneExposureAndTakesTheLightAgain) {
+  const auto results = results_with("shadow", 1);
+  EXPECT_EQ(count("region.unsteady"), 1);
+  EXPECT_EQ(count("region.retaken"), 1);
+  EXPECT_THAT(output_, HasSubstr("motion"));
+  EXPECT_EQ(results["capture"]["unsteady"].size(), 1U);
+  EXPECT_TRUE(results["capture"]["unusable"].empty());
+  EXPECT_NE(report().find("Not steady: region_0_1: motion"), std::string::npos);
+}
+
+TEST_F(UnsteadySession, LeavesALightOutThatIsNeverSteadyAndSaysSo) {
+  const auto results = results_with("shadow", 4);
+  EXPECT_EQ(count("region.unsteady"), 4);
+  EXPECT_EQ(count("region.unusable"), 1);
+  EXPECT_EQ(results["capture"]["unusable"].size(), 1U);
+  EXPECT_NE(report().find("Not usable: region_0_1: its exposures do not agree, 4 times"),
+            std::string::npos);
+}
+
 TEST_F(WholeSession, LeavesAMaterialThatOtherProgramsRead) {
   const auto session = bed_->new_session();
   ASSERT_TRUE(session) << session.error().message;
