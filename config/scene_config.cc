@@ -73,6 +73,15 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.check(d.method != Discretisation::kPolygrid || d.entry == Entry::kDiffuse,
                "entry",
                "beams are followed through tetrahedra: method = \"polygrid\" needs \"diffuse\"");
+  fields.whole(
+      {"directions",
+       "in which diffuse light is followed behind each face to where it scatters first; 0: it "
+       "enters at the surface"},
+      d.directions,
+      Range::between(0, 1024));
+  fields.check(d.method != Discretisation::kPolygrid || d.directions == 0,
+               "directions",
+               "light is followed through tetrahedra: method = \"polygrid\" needs 0");
   fields.number({"tetrahedra", "about so many an object, if all were of one size"},
                 d.tetrahedra,
                 Range::between(100, 2e7));

@@ -158,40 +158,58 @@ void measure_dials() {
   }
 }
 
+namespace {
+
+constexpr std::array kDirections{0, 4};
+
+/// Elements of the size of 140 k tetrahedra all alike, K = 0.1.
+render::DiffusionOptions elements_of(const std::string& name, int directions) {
+  return {.method = render::Discretisation::kElements,
+          .directions = directions,
+          .spacing_mm = render::spacing_for(render::estimate_volume(*shape(name)), 1.4e5),
+          .interior_growth = 0.1,
+          .tolerance = 1e-8};
+}
+
+void print_transport_error(const std::string& which, const TransportError& error) {
+  print_figure("render.error_vs_monte_carlo", which, error.total, "1");
+  print_figure("render.model_error", which, error.model, "1");
+  print_figure("render.discretisation_error", which, error.discretisation, "1");
+  print_figure("render.monte_carlo_noise", which, error.noise, "1");
+  print_bands(which, error);
+}
+
+}  // namespace
+
 void measure_transport() {
   constexpr double kPhotons = 1.6e6;
   ThreadTeam team(kThreads);
-  for (const char* name : {"torus", "figurine"}) {
-    const double spacing = render::spacing_for(render::estimate_volume(*shape(name)), 1.4e5);
-    for (const auto& [collimated, light] :
-         {std::pair{false, "diffuse"}, std::pair{true, "collimated"}}) {
-      const auto error = transport_error(name,
-                                         collimated,
-                                         {.method = render::Discretisation::kElements,
-                                          .spacing_mm = spacing,
-                                          .interior_growth = 0.1,
-                                          .tolerance = 1e-8},
-                                         kPhotons,
-                                         team);
-      const std::string which = std::string(name) + "-" + light;
-      print_figure("render.error_vs_monte_carlo", which, error.total, "1");
-      print_figure("render.model_error", which, error.model, "1");
-      print_figure("render.discretisation_error", which, error.discretisation, "1");
-      print_figure("render.monte_carlo_noise", which, error.noise, "1");
-      print_bands(which, error);
-      if (collimated) continue;
-      const auto milne = transport_error(name,
-                                         false,
-                                         {.method = render::Discretisation::kElements,
-                                          .spacing_mm = spacing,
-                                          .interior_growth = 0.1,
-                                          .tolerance = 1e-8,
-                                          .boundary = BoundaryModel::kMilne},
-                                         kPhotons,
-                                         team);
-      print_figure("render.error_vs_monte_carlo", which + "-milne", milne.total, "1");
-      print_figure("render.model_error", which + "-milne", milne.model, "1");
-      print_bands(which + "-milne", milne);
+  for (const std::string name : {"torus", "figurine"}) {
+    print_transport_error(name + "-collimated",
+                          transport_error(name, true, elements_of(name, 0), kPhotons, team));
+    for (const int directions : kDirections) {
+      const std::string which = fmt::format("{}-diffuse-{}-directions", name, directions);
+      auto options = elements_of(name, directions);
+      print_transport_error(which, transport_error(name, false, options, kPhotons, team));
+      options.boundary = BoundaryModel::kMilne;
+      print_transport_error(which + "-milne",
+                            transport_error(name, false, options, kPhotons, team));
+    }
+  }
+}
+
+void measure_directions() {
+  constexpr int kMany = 64;
+  ThreadTeam team(kThreads);
+  for (const std::string name : {"torus", "figurine"}) {
+    const auto solid = shape(name);
+    const LitMarble reference(*solid, elements_of(name, kMany), team);
+    for (const int directions : {0, 1, 2, 4, 8, 16}) {
+      LitMarble marble(*solid, elements_of(name, directions), team);
+      const std::string which = fmt::format("{}-{}", name, directions);
+      print_figure("render.directions_error", which, marble.error_against(reference), "1");
+      marble.set_tolerance(1e-3);
+      print_figure("render.directions_frame_seconds", which, marble.frame_seconds(5), "s");
     }
   }
 }

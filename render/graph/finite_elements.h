@@ -42,6 +42,8 @@ class FiniteElements {
                                   std::span<const std::array<float, 3>> of_middles) const;
   /// The edges of the surface, by vertices of the mesh.
   const std::vector<std::array<int, 2>>& surface_edges() const { return edges_; }
+  /// The edges of each of the triangles of surface_of(), the k-th from its corner k to the next.
+  const std::vector<std::array<int, 3>>& edges_of_triangles() const { return edges_of_; }
   SurfaceLight surface_light(std::span<const std::array<float, 3>> q,
                              const std::vector<Lanes<double>>& phi) const;
   /// A third of the areas of the surface triangles around each vertex; 0
@@ -57,8 +59,7 @@ class FiniteElements {
   reconstruct::diffusion::Boundary boundary_;
   std::vector<std::array<int, 3>> surface_;
   std::vector<std::array<int, 2>> edges_;
-  std::vector<std::array<int, 3>>
-      edges_of_;  // of each triangle, the k-th from its corner k to the next
+  std::vector<std::array<int, 3>> edges_of_;
   std::vector<double> areas_;
   LaneMatrix<double> matrix_;
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "reconstruct/diffusion/fresnel.h"
+
 namespace opaline::render {
 namespace {
 
@@ -15,8 +17,11 @@ double centroid(double t) { return t < 1e-3 ? 0.5 - t / 12.0 : 1.0 / t - 1.0 / s
 
 }  // namespace
 
-BeamDeposit::BeamDeposit(TetMesh mesh, std::vector<Optics> optics)
-    : mesh_(std::move(mesh)), optics_(std::move(optics)), neighbours_(neighbours_of(mesh_)) {
+BeamDeposit::BeamDeposit(TetMesh mesh, std::vector<Optics> optics, double ior)
+    : mesh_(std::move(mesh)),
+      optics_(std::move(optics)),
+      ior_(ior),
+      neighbours_(neighbours_of(mesh_)) {
   place_faces();
 }
 
@@ -36,6 +41,7 @@ void BeamDeposit::place_faces() {
       const Vec3 b = mesh_.vertices[face[1]];
       const Vec3 c = mesh_.vertices[face[2]];
       const Vec3 n = cross(b - a, c - a);
+      neighbours_[t][k] = -1 - static_cast<int>(faces_.size());
       faces_.push_back({{(a + b + c) * (1.0 / 3.0), normalized(n), std::sqrt(length(n))},
                         static_cast<int>(t),
                         0.5 * length(n)});
@@ -55,8 +61,8 @@ BeamDeposit::Deposit BeamDeposit::step(Walk& walk) const {
     const Vec3 a = mesh_.vertices[face[0]];
     const Vec3 n = cross(mesh_.vertices[face[1]] - a, mesh_.vertices[face[2]] - a);
     here[k] = dot(a - walk.place, n) / volume;
-    slope[k] = -dot(walk.beam.along, n) / volume;
-    if (slope[k] >= 0.0 || (walk.from >= 0 && neighbours_[walk.tet][k] == walk.from)) continue;
+    slope[k] = -dot(walk.along, n) / volume;
+    if (slope[k] >= 0.0 || k == walk.came_through) continue;
     const double to = std::max(0.0, -here[k] / slope[k]);
     if (to >= length_left) continue;
     length_left = to;
@@ -70,18 +76,40 @@ BeamDeposit::Deposit BeamDeposit::step(Walk& walk) const {
     const double t = length_left / (3.0 * optics.diffusion[c]);
     const double scattered = walk.left[c] * -std::expm1(-t);
     const double albedo = 1.0 - 3.0 * optics.diffusion[c] * optics.absorption[c];
-    deposit.power[c] = walk.beam.power[c] * albedo * scattered;
+    deposit.power[c] = walk.power[c] * albedo * scattered;
     const double at = t > 0.0 ? length_left * centroid(t) : 0.0;
     for (int k = 0; k < 4; ++k)
       deposit.corners[c][k] = std::clamp(here[k] + at * slope[k], 0.0, 1.0);
     walk.left[c] -= scattered;
-    if (walk.beam.power[c] > 0.0) most_left = std::max(most_left, walk.left[c]);
+    if (walk.power[c] > 0.0) most_left = std::max(most_left, walk.left[c]);
   }
-  walk.place = walk.place + walk.beam.along * length_left;
-  const bool goes_on = out >= 0 && most_left > kSpent && ++walk.steps < kMostSteps;
-  walk.from = walk.tet;
-  walk.tet = goes_on ? neighbours_[walk.tet][out] : -1;
+  walk.place = walk.place + walk.along * length_left;
+  walk.reached = -1;
+  if (out < 0 || most_left <= kSpent || ++walk.steps >= kMostSteps) {
+    walk.tet = -1;
+  } else if (const int beyond = neighbours_[walk.tet][out]; beyond >= 0) {
+    const auto& back = neighbours_[beyond];
+    walk.came_through = static_cast<int>(std::ranges::find(back, walk.tet) - back.begin());
+    walk.tet = beyond;
+  } else {
+    walk.reached = -1 - beyond;
+    walk.came_through = out;
+  }
   return deposit;
+}
+
+std::array<double, 3> BeamDeposit::mirror(Walk& walk) const {
+  const Vec3 normal = faces_[walk.reached].middle.normal;
+  const double cosine = std::clamp(dot(walk.along, normal), 0.0, 1.0);
+  const double kept = reconstruct::diffusion::fresnel_reflectance(cosine, 1.0 / ior_);
+  std::array<double, 3> gone{};
+  for (int c = 0; c < 3; ++c) {
+    gone[c] = walk.power[c] * walk.left[c] * (1.0 - kept);
+    walk.left[c] *= kept;
+  }
+  walk.along = walk.along - normal * (2.0 * cosine);
+  if (std::ranges::max(walk.left) <= kSpent) walk.tet = -1;
+  return gone;
 }
 
 }  // namespace opaline::render

@@ -21,14 +21,14 @@ struct Beam {
 ///
 ///   E_0 = 1,  E_n = E_(n-1) e^(-t_n),  t_n = l_n sigma_t',   Q_n = P alpha' (E_(n-1) - E_n)     (docs/physics.md, "collimated")
 ///
-/// put down at the centroid of what scatters along l_n, l_n (1 / t_n - 1 / (e^t_n - 1)) from where the beam came in; what
-/// reaches the surface leaves unscattered.
+/// put down at the centroid of what scatters along l_n, l_n (1 / t_n - 1 / (e^t_n - 1)) from where the beam came in. At the
+/// surface R of what arrives is mirrored (Fresnel) and goes on, 1 - R leaves unscattered.
 ///
-/// Threads: visit() may be called from several threads.
+/// Threads: follow() may be called from several threads.
 class BeamDeposit {
  public:
-  /// Needs a valid mesh and coefficients one a tetrahedron.
-  BeamDeposit(TetMesh mesh, std::vector<Optics> optics);
+  /// Needs a valid mesh, coefficients one a tetrahedron, and ior >= 1.
+  BeamDeposit(TetMesh mesh, std::vector<Optics> optics, double ior);
 
   /// Takes other places of the same vertices, and other coefficients.
   void update(const std::vector<Vec3>& vertices, const std::vector<Optics>& optics);
@@ -47,28 +47,40 @@ class BeamDeposit {
     std::array<double, 3> power{};                   ///< Q, W
     std::array<std::array<double, 4>, 3> corners{};  ///< of each channel's place: barycentric
   };
-  /// Calls visit(Deposit) along the beam until a ten-thousandth of it is left.
+  /// Calls visit(Deposit) along the beam until a ten-thousandth of it is left, and leave(face, power) for what passes a face.
+  template <class Visit, class Leave>
+  void follow(const Beam& beam, const Visit& visit, const Leave& leave) const {
+    Walk walk{beam.power, beam.along, faces_[beam.face].middle.place, faces_[beam.face].tet};
+    while (walk.tet >= 0) {
+      visit(step(walk));
+      if (walk.reached >= 0) leave(walk.reached, mirror(walk));
+    }
+  }
   template <class Visit>
   void follow(const Beam& beam, const Visit& visit) const {
-    Walk walk{beam, faces_[beam.face].middle.place, faces_[beam.face].tet};
-    while (walk.tet >= 0) visit(step(walk));
+    follow(beam, visit, [](int, const std::array<double, 3>&) {});
   }
 
  private:
   struct Walk {
-    const Beam& beam;
+    std::array<double, 3> power{};
+    Vec3 along;
     Vec3 place;
     int tet = -1;
-    int from = -1;  // the tetrahedron before
+    int came_through = -1;  // the face's number in the tetrahedron
+    int reached = -1;       // a face of the surface
     std::array<double, 3> left{1.0, 1.0, 1.0};
     int steps = 0;
   };
   Deposit step(Walk& walk) const;
+  /// Turns a walk back at the surface; the power that leaves there.
+  std::array<double, 3> mirror(Walk& walk) const;
   void place_faces();
 
   TetMesh mesh_;
   std::vector<Optics> optics_;
-  std::vector<std::array<int, 4>> neighbours_;
+  double ior_;
+  std::vector<std::array<int, 4>> neighbours_;  // -1 - f: face f of the surface
   std::vector<Face> faces_;
 };
 

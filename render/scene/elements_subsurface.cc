@@ -22,7 +22,7 @@ class ElementsSubsurface final : public Subsurface {
         phi_(large_vector(mesh_.vertices.size(), Lanes<double>::zero())) {}
 
   Result<void> begin_with(const SubsurfaceSetting& setting) {
-    if (auto begun = begin(setting.solid, setting.material, setting.team); !begun) return begun;
+    if (auto begun = begin(setting); !begun) return begun;
     solver_ = std::make_unique<FreshHierarchy<double>>(
         elements_->matrix(), kElementHierarchy, setting.team);
     return ok();
@@ -71,17 +71,25 @@ class ElementsSubsurface final : public Subsurface {
     return places;
   }
 
+  DepositAt deposit_at() const override { return DepositAt::kVertices; }
+
+  /// The mean over the three middles is the integral over the triangle of whatever is quadratic there.
+  Values on_faces(std::span<const std::array<float, 3>> q) const override {
+    Values faces;
+    for (const auto& [a, b, c] : elements_->edges_of_triangles()) {
+      const auto middles = q.subspan(used_.size());
+      auto& mean = faces.emplace_back();
+      for (int k = 0; k < 3; ++k) mean[k] = (middles[a][k] + middles[b][k] + middles[c][k]) / 3.0F;
+    }
+    return faces;
+  }
+
   SolveSummary solve(std::span<const std::array<float, 3>> q,
-                     std::span<const Beam> beams,
+                     std::span<const std::array<double, 3>> scattered,
                      std::stop_token stop) override {
     std::vector<Lanes<double>> load = elements_->load(on_mesh(q), q.subspan(used_.size()));
-    for (const Beam& beam : beams) {
-      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
-        for (int k = 0; k < 4; ++k) {
-          Lanes<double>& sum = load[mesh_.tets[d.tet][k]];
-          for (int c = 0; c < 3; ++c) sum.set(c, sum[c] + d.corners[c][k] * d.power[c]);
-        }
-      });
+    for (std::size_t v = 0; v < scattered.size(); ++v) {
+      for (int c = 0; c < 3; ++c) load[v].set(c, load[v][c] + scattered[v][c]);
     }
     return solver_->solve(load, phi_, solve_options(), stop);
   }

@@ -33,7 +33,7 @@ class GraphSubsurface final : public Subsurface {
       if (options_.corrections > 0)
         lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, setting.team);
     }
-    if (auto begun = begin(setting.solid, setting.material, setting.team); !begun) return begun;
+    if (auto begun = begin(setting); !begun) return begun;
     solver_ =
         std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, setting.team);
     if constexpr (kIsLattice) {
@@ -65,16 +65,14 @@ class GraphSubsurface final : public Subsurface {
     return places;
   }
 
+  DepositAt deposit_at() const override { return DepositAt::kTetrahedra; }
+
   SolveSummary solve(std::span<const std::array<float, 3>> q,
-                     std::span<const Beam> beams,
+                     std::span<const std::array<double, 3>> scattered,
                      std::stop_token stop) override {
     diffusion_.load(q, load_);
-    for (const Beam& beam : beams) {
-      beams_->follow(beam, [&](const BeamDeposit::Deposit& d) {
-        for (int c = 0; c < 3; ++c) {
-          load_[d.tet].set(c, load_[d.tet][c] + static_cast<T>(d.power[c]));
-        }
-      });
+    for (std::size_t i = 0; i < scattered.size(); ++i) {
+      for (int c = 0; c < 3; ++c) load_[i].set(c, load_[i][c] + static_cast<T>(scattered[i][c]));
     }
     const auto solve = [&](const std::vector<Lanes<T>>& load, double tolerance) {
       auto options = solve_options();

@@ -137,10 +137,12 @@ enum class Entry : std::uint8_t { kCollimated, kDiffuse };
 struct DiffusionOptions {
   Discretisation method = Discretisation::kElements;
   Entry entry = Entry::kCollimated;  ///< a polygrid takes kDiffuse whatever this is
-  double tetrahedra = 1e5;           ///< about so many an object, if they were all of one size; or
-  double spacing_mm = 0.0;           ///< this edge of the lattice; 0: from `tetrahedra`
-  double interior_growth = 0.1;      ///< the papers' K
-  double tolerance = 1e-4;           ///< relative residual
+  int directions =
+      0;  ///< in which diffuse light is followed behind each face to where it scatters first; 0: it enters at the surface
+  double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
+  double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
+  double interior_growth = 0.1;  ///< the papers' K
+  double tolerance = 1e-4;       ///< relative residual
   int corrections = 8;  ///< of a graph's links that lean, at most so many a solution; 0: none
   int max_iterations = 300;
   reconstruct::diffusion::BoundaryModel boundary =

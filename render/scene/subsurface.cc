@@ -131,8 +131,8 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(TetMesh mesh,
   Report report;
   report.spacing_mm = options.spacing_mm;
   take_quality(mesh, report);
-  auto made =
-      set_up(std::move(mesh), {solid, material, *boundary, options, team}, report.spacing_mm, stop);
+  auto made = set_up(
+      std::move(mesh), {solid, material, *boundary, ior, options, team}, report.spacing_mm, stop);
   if (!made) return made.error();
   Report& own = (*made)->report_;
   report.unknowns =
@@ -144,19 +144,19 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(TetMesh mesh,
   return made;
 }
 
-Result<void> Subsurface::begin(const SignedDistance& solid,
-                               const MaterialAt& material,
-                               ThreadTeam& team) {
-  team_ = &team;
+Result<void> Subsurface::begin(const SubsurfaceSetting& setting) {
+  const SignedDistance& solid = setting.solid;
+  team_ = &setting.team;
+  two_a_ = 2.0 * setting.boundary.a;
   nodes_ = nodes();
-  sample(material);
+  sample(setting.material);
   if (auto taken = assemble(); !taken) return taken;
   edges_ = edges_between();
   rest_places_ = flat_places();
   for (SurfacePlace& p : rest_places_) p.normal = smooth_normal(solid, p.place, p.normal, p.size);
   places_ = rest_places_;
   if (options_.method != Discretisation::kPolygrid) {
-    beams_ = std::make_unique<BeamDeposit>(mesh_, optics_);
+    beams_ = std::make_unique<BeamDeposit>(mesh_, optics_, setting.ior);
   }
   return ok();
 }
@@ -184,7 +184,7 @@ void Subsurface::note_lengths() {
 Result<void> Subsurface::set_material(const MaterialAt& material) {
   sample(material);
   if (auto taken = assemble(); !taken) return taken;
-  if (beams_) beams_->update(mesh_.vertices, optics_);
+  follow_anew();
   note_lengths();
   return ok();
 }
@@ -207,7 +207,7 @@ Result<std::size_t> Subsurface::bend(const Deformation& deformation) {
   mesh_.vertices = std::move(bent.vertices);
   for (std::size_t v = 0; v < used_.size(); ++v) surface_.vertices[v] = mesh_.vertices[used_[v]];
   if (auto taken = assemble(); !taken) return taken.error();
-  if (beams_) beams_->update(mesh_.vertices, optics_);
+  follow_anew();
   places_ = flat_places();
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const SurfacePlace& rest = rest_places_[i];
@@ -217,10 +217,34 @@ Result<std::size_t> Subsurface::bend(const Deformation& deformation) {
   return inverted;
 }
 
+void Subsurface::follow_anew() {
+  if (beams_) beams_->update(mesh_.vertices, optics_);
+  diffuse_q_.clear();
+}
+
+const FirstScattering& Subsurface::diffuse(std::span<const std::array<float, 3>> q) {
+  if (diffuse_q_.size() == q.size() && std::ranges::equal(diffuse_q_, q)) return diffuse_;
+  diffuse_q_.assign(q.begin(), q.end());
+  diffuse_ = first_scattering(
+      *beams_, diffuse_beams(*beams_, on_faces(q), options_.directions), deposit_at(), *team_);
+  return diffuse_;
+}
+
 Result<SolveSummary> Subsurface::light(std::span<const std::array<float, 3>> q,
                                        std::span<const Beam> beams,
                                        std::stop_token stop) {
-  const SolveSummary summary = solve(q, beams, stop);
+  std::vector<std::array<double, 3>> scattered;
+  if (!beams.empty()) scattered = first_scattering(*beams_, beams, deposit_at(), *team_).scattered;
+  const Values dark(follows_diffuse() ? q.size() : 0);
+  if (follows_diffuse()) {
+    const auto& more = diffuse(q).scattered;
+    if (scattered.empty()) scattered.resize(more.size());
+    for (std::size_t i = 0; i < more.size(); ++i) {
+      for (int c = 0; c < 3; ++c) scattered[i][c] += more[i][c];
+    }
+    q = dark;
+  }
+  const SolveSummary summary = solve(q, scattered, stop);
   if (summary.termination == Termination::kCancelled) return cancelled("solving for the light");
   if (!(summary.relative_residual <= kFarOff * options_.tolerance)) {
     return internal_error(
@@ -229,7 +253,27 @@ Result<SolveSummary> Subsurface::light(std::span<const std::array<float, 3>> q,
                     summary.message));
   }
   lit_ = at_surface(q);
+  if (follows_diffuse()) show_passed(diffuse_.passed);
   return summary;
+}
+
+/// Power through faces, as exitance of their corners; with J_n = M, phi = 2 A M it has the angles of diffused light.
+void Subsurface::show_passed(const std::vector<std::array<double, 3>>& passed) {
+  std::vector<std::array<double, 3>> power(surface_.vertices.size());
+  std::vector<double> areas(power.size());
+  for (std::size_t f = 0; f < passed.size(); ++f) {
+    for (const int v : surface_.triangles[f]) {
+      areas[v] += beams_->faces()[f].area;
+      for (int c = 0; c < 3; ++c) power[v][c] += passed[f][c];
+    }
+  }
+  for (std::size_t v = 0; v < power.size(); ++v) {
+    for (int c = 0; c < 3 && areas[v] > 0.0; ++c) {
+      const double exitance = power[v][c] / areas[v];
+      lit_.net_flux[v][c] += static_cast<float>(exitance);
+      lit_.fluence[v][c] += static_cast<float>(two_a_ * exitance);
+    }
+  }
 }
 
 }  // namespace opaline::render

@@ -13,11 +13,14 @@
 #include "render/graph/optics.h"
 #include "render/mesh/signed_distance.h"
 #include "render/scene/beam_deposit.h"
+#include "render/scene/first_scattering.h"
 #include "render/scene/scene.h"
 #include "render/scene/surfaces.h"
 #include "render/tetrahedra/tet_mesh.h"
 
 namespace opaline::render {
+
+struct SubsurfaceSetting;
 
 /// A solid in which light diffuses: cut up, its coefficients taken at each node, ready to be lit again and again, each
 /// solution started from the one before.
@@ -83,8 +86,10 @@ class Subsurface {
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
   /// What beams enter through; none on a polygrid, which has no tetrahedra to follow them in.
   const BeamDeposit* beams() const { return beams_.get(); }
-  /// Solves for light q, W/mm^2 transmitted into the surface and diffuse behind it, one value a place, and for beams. Errors: kCancelled; kInternal where the
-  /// solution did not get below ten times the tolerance.
+  /// Solves for light q, W/mm^2 transmitted into the surface and diffuse behind it, one value a place, and for beams. Where
+  /// the options have directions, q is followed along them to where it scatters first (docs/physics.md), and what of it leaves
+  /// unscattered is in lit(), as if it left diffusely; of beams it is not.
+  /// Errors: kCancelled; kInternal where the solution did not get below ten times the tolerance.
   Result<reconstruct::diffusion::SolveSummary> light(std::span<const std::array<float, 3>> q,
                                                      std::span<const Beam> beams,
                                                      std::stop_token stop);
@@ -102,26 +107,39 @@ class Subsurface {
   virtual std::vector<Vec3> nodes() const = 0;
   virtual std::vector<SurfacePlace> flat_places() const = 0;
   virtual std::vector<std::array<int, 2>> edges_between() const { return {}; }
-  virtual reconstruct::diffusion::SolveSummary solve(std::span<const std::array<float, 3>> q,
-                                                     std::span<const Beam> beams,
-                                                     std::stop_token stop) = 0;
+  /// The unknowns that light scatters into.
+  virtual DepositAt deposit_at() const = 0;
+  /// q in the middles of the faces of the surface, in the order of beams()->faces().
+  virtual Values on_faces(std::span<const std::array<float, 3>> q) const {
+    return {q.begin(), q.end()};
+  }
+  /// `scattered`: sources one an unknown, W; empty where there are none.
+  virtual reconstruct::diffusion::SolveSummary solve(
+      std::span<const std::array<float, 3>> q,
+      std::span<const std::array<double, 3>> scattered,
+      std::stop_token stop) = 0;
   virtual SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const = 0;
 
   reconstruct::diffusion::SolveOptions solve_options() const {
     return {.tolerance = options_.tolerance, .max_iterations = options_.max_iterations};
   }
   /// Works out the optics and lets the method begin with them.
-  Result<void> begin(const SignedDistance& solid, const MaterialAt& material, ThreadTeam& team);
+  Result<void> begin(const SubsurfaceSetting& setting);
 
   TetMesh mesh_;
   std::vector<int> used_;  // the mesh's vertex of each of the surface's
   DiffusionOptions options_;
   std::vector<Optics> optics_;
-  std::unique_ptr<BeamDeposit> beams_;
 
  private:
+  bool follows_diffuse() const { return options_.directions > 0 && beams_; }
+  /// Follows q to where it scatters first, unless that is known.
+  const FirstScattering& diffuse(std::span<const std::array<float, 3>> q);
+  void show_passed(const std::vector<std::array<double, 3>>& passed);
+
   void sample(const MaterialAt& material);
   void note_lengths();
+  void follow_anew();
 
   TriangleMesh surface_;
   std::vector<SurfacePlace> places_;
@@ -133,6 +151,10 @@ class Subsurface {
   std::vector<SurfacePlace> rest_places_;
   std::vector<bool> inverted_corners_;
   SurfaceLight lit_;
+  std::unique_ptr<BeamDeposit> beams_;
+  double two_a_ = 2.0;  // of the boundary condition
+  Values diffuse_q_;    // what diffuse_ is of; empty: of another solid or material
+  FirstScattering diffuse_;
 };
 
 }  // namespace opaline::render

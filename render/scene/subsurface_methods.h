@@ -12,6 +12,7 @@ struct SubsurfaceSetting {
   const SignedDistance& solid;
   const Subsurface::MaterialAt& material;
   const reconstruct::diffusion::Boundary& boundary;
+  double ior;
   const DiffusionOptions& options;
   ThreadTeam& team;
 };

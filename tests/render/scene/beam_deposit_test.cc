@@ -54,7 +54,7 @@ double chord(const BeamDeposit& deposit, Vec3 from, Vec3 along) {
 // Beer's law: alpha' (1 - e^-tau) scatters, on average 1 / sigma_t' - L / (e^tau - 1) from where the beam came in.
 TEST(BeamDeposit, ScattersWhatBeersLawTakesWhereItTakesIt) {
   const TetMesh mesh = sphere(2.0);
-  const BeamDeposit deposit(mesh, std::vector(mesh.tets.size(), optics()));
+  const BeamDeposit deposit(mesh, std::vector(mesh.tets.size(), optics()), kIor);
   for (const std::size_t f : {std::size_t{0}, deposit.faces().size() / 2}) {
     const auto& face = deposit.faces()[f];
     const Vec3 along = normalized(face.middle.normal * -1.0 + Vec3{0.2, 0.1, -0.1});
@@ -89,7 +89,7 @@ struct LitBall {
 
 LitBall lit_ball(double spacing) {
   LitBall ball{sphere(spacing), {}, {}, {}};
-  const BeamDeposit deposit(ball.mesh, std::vector(ball.mesh.tets.size(), optics()));
+  const BeamDeposit deposit(ball.mesh, std::vector(ball.mesh.tets.size(), optics()), kIor);
   for (std::size_t f = 0; f < deposit.faces().size(); ++f) {
     const auto& face = deposit.faces()[f];
     const Vec3 n = face.middle.normal;
@@ -117,7 +117,7 @@ LitBall lit_ball(double spacing) {
 // 2 mm across the light. 96,000 photons are sure of a layer with a tenth of the light to 1 %, of one with a hundredth to 3 %.
 TEST(BeamDeposit, LightScattersFirstWhereMonteCarloHasItsFirstCollisions) {
   const LitBall ball = lit_ball(1.25);
-  const BeamDeposit deposit(ball.mesh, std::vector(ball.mesh.tets.size(), optics()));
+  const BeamDeposit deposit(ball.mesh, std::vector(ball.mesh.tets.size(), optics()), kIor);
   const auto truth = sim::trace_tets(
       ball.traced,
       ball.power,

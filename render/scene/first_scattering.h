@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "base/thread_team.h"
+#include "render/scene/beam_deposit.h"
+
+namespace opaline::render {
+
+/// What becomes of beams: the source of the diffused light, and what leaves without having been scattered.
+struct FirstScattering {
+  std::vector<std::array<double, 3>> scattered;  ///< W; one a tetrahedron, or one a vertex
+  std::vector<std::array<double, 3>> passed;     ///< W through each face of the surface
+};
+
+enum class DepositAt : std::uint8_t { kTetrahedra, kVertices };
+
+/// Follows beams, a share of them in each thread of the team. At vertices, each deposit goes to the corners of its tetrahedron by its
+/// barycentric coordinates.
+FirstScattering first_scattering(const BeamDeposit& deposit,
+                                 std::span<const Beam> beams,
+                                 DepositAt where,
+                                 ThreadTeam& team);
+
+/// Light that goes on behind each face in all directions, with the density cos theta / pi, as `directions` beams a face. They are
+/// stratified, and differ from face to face (Roberts' R2 sequence), so that few of them do: what a place gets comes from many
+/// faces. `q` one a face, W/mm^2.
+std::vector<Beam> diffuse_beams(const BeamDeposit& deposit,
+                                std::span<const std::array<float, 3>> q,
+                                int directions);
+
+}  // namespace opaline::render
