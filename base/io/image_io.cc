@@ -11,6 +11,8 @@
 #include <optional>
 #include <set>
 
+#include "base/io/dng.h"
+
 namespace opaline {
 namespace {
 
@@ -228,6 +230,17 @@ Result<ImageFile> decode(std::span<const std::byte> bytes,
   }
 }
 
+Result<ImageFile> decode_dng(std::span<const std::byte> bytes, const ImageLimits& limits) {
+  const auto picture = read_dng_picture(bytes);
+  if (!picture) return picture.error();
+  if (picture->mosaic) return decode_dng_mosaic(bytes, *picture, limits);
+  if (picture->first) return decode(bytes, ImageFormat::kTiff, limits);
+  return invalid_argument(
+      "this DNG's picture of all three colours (LinearRaw) is behind a smaller one: convert it to "
+      "a "
+      "16-bit TIFF without gamma");
+}
+
 }  // namespace
 
 Result<std::vector<std::byte>> encode_image(const ImageFile& image, ImageFormat format) {
@@ -247,9 +260,10 @@ Result<ImageFile> decode_image(std::span<const std::byte> bytes, const ImageLimi
         fmt::format("{} bytes; expected at most {}", bytes.size(), limits.bytes));
   }
   const std::optional<ImageFormat> format = detect(bytes);
-  if (!format) return invalid_argument("not a PNG, TIFF, EXR or JPEG file");
+  if (!format) return invalid_argument("not a PNG, TIFF, DNG, EXR or JPEG file");
   try {
     use_calling_thread();
+    if (*format == ImageFormat::kTiff && is_dng(bytes)) return decode_dng(bytes, limits);
     return decode(bytes, *format, limits);
   } catch (const std::exception& failure) {
     return invalid_argument(fmt::format("{}: {}", name_of(*format).spoken, failure.what()));

@@ -42,7 +42,7 @@ struct ImageLimits {
 /// format does not take, or wrong channel names.
 Result<std::vector<std::byte>> encode_image(const ImageFile& image, ImageFormat format);
 
-/// Reads PNG, TIFF (8-, 16-bit, float), EXR (half, float) or JPEG (8-bit), told apart by their first bytes. EXR
+/// Reads PNG, TIFF (8-, 16-bit, float), DNG (dng.h), EXR (half, float) or JPEG (8-bit), told apart by their first bytes. EXR
 /// channels come in the order R G B A, then the others as the file has them: use select_channels()
 /// to have them by name. Errors: kInvalidArgument for a truncated, damaged, too large or foreign
 /// file, saying which.

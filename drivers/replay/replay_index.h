@@ -36,7 +36,7 @@ struct Photograph {
 ///     frame_period_ms = 33.333333
 ///     latency_ms = 50
 ///
-///     [[photograph]]            # once for each; 8- and 16-bit PNG and TIFF, EXR, JPEG; grey ones count for three channels
+///     [[photograph]]            # once for each; 8- and 16-bit PNG and TIFF, DNG (its mosaic binned: half its columns and rows), EXR, JPEG; grey ones count for three channels
 ///     file = "region_0_0-1.png"
 ///     pattern = "region_0_0"    # what was shown, as the capture names it: "black", "region_ROW_COLUMN", "held_out_..."
 ///     pattern_id = 16           # or its number, which counts where both are given; 0 = lamp dark

@@ -93,7 +93,7 @@ TEST(ImageIo, ForeignFilesAreNamedAsSuch) {
   const std::string_view text = "GIF89a and whatever follows";
   const auto back = decode_image(std::as_bytes(std::span(text)));
   ASSERT_FALSE(back);
-  EXPECT_EQ(back.error().message, "not a PNG, TIFF, EXR or JPEG file");
+  EXPECT_EQ(back.error().message, "not a PNG, TIFF, DNG, EXR or JPEG file");
 }
 
 TEST(ImageIo, RefusesWhatIsOverTheLimits) {
