@@ -13,7 +13,7 @@
 
 // render: how accurate and how fast the renderer's numerical ground is, as JSON lines. Groups of figures, all by default:
 //   sphere     error against the exact solution of a lit sphere, graph, finite elements and polygrid
-//   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1, and with twice as many elements, against finite
+//   accuracy   a marbled torus and figurine's surface radiance for K = 1 and 0.1, and with two and four times as many elements, against finite
 //              elements of a quarter of the size, and what those are still off (a third of what half the size differs from them)
 //   geometry   where the error of elements of K = 0.1 comes from: the same facets with eight times as many elements, and what
 //              those are off

@@ -83,7 +83,7 @@ double graph_error(const render::TetMesh& sphere, int corrections, ThreadTeam& t
 }
 
 double polygrid_error(const render::SignedDistance& sphere, double spacing, ThreadTeam& team) {
-  const auto grid = render::make_polygrid(sphere, spacing, {});
+  const auto grid = render::make_polygrid(sphere, spacing, 0.0, {});
   ENSURE(grid.has_value());
   return two_point_error(*grid, {}, 0, team);
 }

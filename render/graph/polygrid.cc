@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace opaline::render {
 namespace {
@@ -11,13 +12,20 @@ namespace {
 constexpr std::array<Vec3, 6> kDirections{
     {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
 
-/// The places of a lattice around a solid, and which are nodes.
+constexpr int kMostLevels = 6;
+constexpr int kOutside = -1;
+
+using Cell = std::array<long, 3>;
+
+/// The places of a lattice around a solid, joined to cells of 2^level places a side.
 class Lattice {
  public:
   Lattice(const Box& box, double spacing) : spacing_(spacing) {
     const Vec3 size = box.size();
-    const auto count = [spacing](double length) {
-      return static_cast<long>(std::ceil(length / spacing)) + 2;
+    constexpr long kLargest = 1L << (kMostLevels - 1);
+    const auto count = [spacing](double length) {  // cells of every size fit in
+      const auto places = static_cast<long>(std::ceil(length / spacing)) + 2;
+      return (places + kLargest - 1) / kLargest * kLargest;
     };
     counts_ = {count(size.x), count(size.y), count(size.z)};
     low_ = box.centre() -
@@ -27,52 +35,129 @@ class Lattice {
   std::size_t places() const {
     return static_cast<std::size_t>(counts_[0]) * counts_[1] * counts_[2];
   }
-  Vec3 place(long i, long j, long k) const {
-    return low_ + (Vec3{double(i), double(j), double(k)} + Vec3{0.5, 0.5, 0.5}) * spacing_;
+  /// The centre of a cell that begins at a place.
+  Vec3 centre(const Cell& first, long width) const {
+    const double half = 0.5 * static_cast<double>(width);
+    return low_ + Vec3{double(first[0]) + half, double(first[1]) + half, double(first[2]) + half} *
+                      spacing_;
   }
-  std::size_t index(long i, long j, long k) const {
-    return static_cast<std::size_t>((k * counts_[1] + j) * counts_[0] + i);
+  std::size_t index(const Cell& c) const {
+    return static_cast<std::size_t>((c[2] * counts_[1] + c[1]) * counts_[0] + c[0]);
+  }
+  bool holds(const Cell& c) const {
+    for (int a = 0; a < 3; ++a) {
+      if (c[a] < 0 || c[a] >= counts_[a]) return false;
+    }
+    return true;
   }
 
-  /// Numbers the places inside the solid; -1 for the others.
-  std::vector<int> number_nodes(const SignedDistance& solid,
-                                Polygrid& grid,
-                                std::stop_token stop) const {
-    std::vector<int> number(places(), -1);
-    for (long k = 0; k < counts_[2] && !stop.stop_requested(); ++k) {
-      for (long j = 0; j < counts_[1]; ++j) {
-        for (long i = 0; i < counts_[0]; ++i) {
-          const Vec3 p = place(i, j, k);
-          if (solid.at(p) >= 0.0) continue;
-          number[index(i, j, k)] = static_cast<int>(grid.inner.size());
-          grid.inner.push_back(p);
+  void find_inside(const SignedDistance& solid, const std::stop_token& stop) {
+    level_.assign(places(), kOutside);
+    each(1, stop, [&](const Cell& c) {
+      if (solid.at(centre(c, 1)) < 0.0) level_[index(c)] = 0;
+    });
+  }
+
+  /// Joins what may be 2^level places wide.
+  void join(const SignedDistance& solid, double growth, int level, const std::stop_token& stop) {
+    const long width = 1L << level;
+    const std::vector<std::int16_t> before = level_;
+    each(width, stop, [&](const Cell& first) {
+      if (!whole(before, first, width, level - 1, level - 1)) return;
+      const double depth = -solid.at(centre(first, width));
+      if (static_cast<double>(width) * spacing_ > spacing_ + growth * depth) return;
+      for (int k = 0; k < 6; ++k) {  // no neighbour less than half as large, nor the surface
+        Cell beside = first;
+        beside[k / 2] += k % 2 == 0 ? -width : width;
+        if (!holds(beside) || !whole(before, beside, width, level - 1, kMostLevels)) return;
+      }
+      fill(level_, first, width, static_cast<std::int16_t>(level));
+    });
+  }
+
+  void number_nodes(Polygrid& grid) {
+    number_.assign(places(), -1);
+    each(1, {}, [&](const Cell& first) {
+      if (level_[index(first)] < 0 || number_[index(first)] >= 0) return;
+      const long width = 1L << level_[index(first)];
+      fill(number_, first, width, static_cast<int>(grid.inner.size()));
+      grid.inner.push_back(centre(first, width));
+      const double side = spacing_ * static_cast<double>(width);
+      grid.volumes.push_back(side * side * side);
+      firsts_.push_back(first);
+    });
+  }
+
+  void link(Polygrid& grid, std::size_t node) const {
+    const Cell& first = firsts_[node];
+    const long width = 1L << level_[index(first)];
+    const double side = spacing_ * static_cast<double>(width);
+    for (int k = 0; k < 6; ++k) {
+      Cell beside = first;
+      beside[k / 2] += k % 2 == 0 ? -1 : width;
+      const int next = level_[index(beside)];  // the lattice's rim is outside the solid
+      const bool smaller = next >= 0 && (1L << next) < width;
+      const long parts = smaller ? 2 : 1;
+      for (long u = 0; u < parts; ++u) {
+        for (long v = 0; v < parts; ++v) {
+          Cell at = beside;
+          at[(k / 2 + 1) % 3] += u * width / 2;
+          at[(k / 2 + 2) % 3] += v * width / 2;
+          const double area = side * side / static_cast<double>(parts * parts);
+          const int other = number_[index(at)];
+          const double length =
+              other >= 0 ? opaline::length(grid.inner[other] - grid.inner[node]) : side;
+          grid.links[node].push_back({other, -1, area, 0.5 * side, length});
         }
       }
     }
-    return number;
-  }
-
-  std::array<int, 6> neighbours(Vec3 p, const std::vector<int>& number) const {
-    std::array<int, 6> found{};
-    for (int k = 0; k < 6; ++k) {
-      const Vec3 cell = (p - low_) * (1.0 / spacing_) + kDirections[k];
-      const auto at = [](double x) { return static_cast<long>(std::floor(x)); };
-      found[k] = number[index(
-          at(cell.x), at(cell.y), at(cell.z))];  // the lattice's rim is outside the solid
-    }
-    return found;
   }
 
  private:
+  /// Cells of `width` places, x fastest.
+  template <class Visit>
+  void each(long width, const std::stop_token& stop, const Visit& visit) const {
+    for (long k = 0; k < counts_[2] && !stop.stop_requested(); k += width) {
+      for (long j = 0; j < counts_[1]; j += width) {
+        for (long i = 0; i < counts_[0]; i += width) visit(Cell{i, j, k});
+      }
+    }
+  }
+
+  /// Whether all places of a cell have a level from `least` to `most`.
+  bool whole(const std::vector<std::int16_t>& levels,
+             const Cell& first,
+             long width,
+             int least,
+             int most) const {
+    for (long k = 0; k < width; ++k) {
+      for (long j = 0; j < width; ++j) {
+        for (long i = 0; i < width; ++i) {
+          const int level = levels[index({first[0] + i, first[1] + j, first[2] + k})];
+          if (level < least || level > most) return false;
+        }
+      }
+    }
+    return true;
+  }
+
+  template <class T>
+  void fill(std::vector<T>& values, const Cell& first, long width, T value) const {
+    for (long k = 0; k < width; ++k) {
+      for (long j = 0; j < width; ++j) {
+        for (long i = 0; i < width; ++i)
+          values[index({first[0] + i, first[1] + j, first[2] + k})] = value;
+      }
+    }
+  }
+
   double spacing_;
   Vec3 low_;
-  std::array<long, 3> counts_{};
+  Cell counts_{};
+  std::vector<std::int16_t> level_;  // of each place, of the cell it is in
+  std::vector<int> number_;          // the node of each place
+  std::vector<Cell> firsts_;         // of each node
 };
-
-void link_inside(Polygrid& grid, std::size_t node, const std::array<int, 6>& neighbours) {
-  const double h = grid.spacing;
-  for (int k = 0; k < 6; ++k) grid.links[node][k] = {neighbours[k], -1, h * h, 0.5 * h, h};
-}
 
 void link_surface(const SignedDistance& solid, Polygrid& grid, std::size_t node) {
   const double h = grid.spacing;
@@ -101,9 +186,13 @@ void link_surface(const SignedDistance& solid, Polygrid& grid, std::size_t node)
 
 Result<Polygrid> make_polygrid(const SignedDistance& solid,
                                double spacing_mm,
+                               double interior_growth,
                                std::stop_token stop) {
   if (!(spacing_mm > 0.0) || !std::isfinite(spacing_mm)) {
     return invalid_argument(fmt::format("a spacing of {} mm; expected > 0", spacing_mm));
+  }
+  if (!(interior_growth >= 0.0)) {
+    return invalid_argument(fmt::format("a growth of {}; expected at least 0", interior_growth));
   }
   const Vec3 size = solid.bounds().size();
   const double places =
@@ -114,20 +203,25 @@ Result<Polygrid> make_polygrid(const SignedDistance& solid,
                     places,
                     kMostPolygridPlaces));
   }
-  const Lattice lattice(solid.bounds(), spacing_mm);
-  Polygrid grid{.spacing = spacing_mm, .inner = {}, .volumes = {}, .links = {}, .surface = {}};
-  const std::vector<int> number = lattice.number_nodes(solid, grid, stop);
+  Lattice lattice(solid.bounds(), spacing_mm);
+  lattice.find_inside(solid, stop);
+  for (int level = 1; level < kMostLevels && interior_growth > 0.0; ++level) {
+    lattice.join(solid, interior_growth, level, stop);
+  }
   if (stop.stop_requested()) return cancelled("building a polygrid");
+  Polygrid grid{.spacing = spacing_mm, .inner = {}, .volumes = {}, .links = {}, .surface = {}};
+  lattice.number_nodes(grid);
   if (grid.inner.empty()) {
     return invalid_argument(fmt::format(
         "no node of a lattice of {} mm lies in the solid: choose a smaller spacing", spacing_mm));
   }
-  grid.volumes.assign(grid.inner.size(), spacing_mm * spacing_mm * spacing_mm);
   grid.links.resize(grid.inner.size());
   for (std::size_t node = 0; node < grid.inner.size(); ++node) {
-    const auto neighbours = lattice.neighbours(grid.inner[node], number);
-    link_inside(grid, node, neighbours);
-    if (std::ranges::min(neighbours) < 0) link_surface(solid, grid, node);
+    lattice.link(grid, node);
+    const auto& links = grid.links[node];
+    if (std::ranges::any_of(links, [](const auto& link) { return link.inner < 0; })) {
+      link_surface(solid, grid, node);
+    }
   }
   return grid;
 }

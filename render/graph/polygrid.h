@@ -19,6 +19,10 @@ namespace opaline::render {
 /// of the surface itself. (Conditions along the links instead stall at 5 to 6 % of error, docs/physics.md.) So TwoPoint serves
 /// this graph as it serves a QuadGraph, and converges with h.
 ///
+/// Adaptive with depth (Wang 2008, sec. 5): eight nodes become one of twice the spacing, and so on, where they lie so deep that
+/// spacing + K depth allows it, away from the surface, and where no neighbour then is less than half as large. Towards smaller
+/// neighbours a node has four links, which lean: a small error, where the light is smooth.
+///
 /// What is thinner than h may be missed. Units: mm.
 struct Polygrid {
   using Link = QuadGraph::Link;
@@ -27,18 +31,20 @@ struct Polygrid {
   double spacing = 1.0;
   std::vector<Vec3> inner;
   std::vector<double> volumes;
-  std::vector<std::array<Link, 6>>
-      links;  ///< towards -x, +x, -y, +y, -z, +z; neither inner nor surface: nothing there
+  /// Towards -x, +x, -y, +y, -z, +z, one each or four; neither inner nor surface: nothing there.
+  std::vector<std::vector<Link>> links;
   std::vector<SurfaceNode> surface;
 };
 
 inline constexpr std::size_t kMostPolygridPlaces = 200'000'000;
 
-/// Nodes at the centres of cells of `spacing_mm`, in the order x fastest.
-/// Errors: kInvalidArgument for a spacing that is not > 0, a lattice of more than kMostPolygridPlaces, or a solid without a
+/// Nodes at the centres of cells of `spacing_mm`, or of 2, 4, ... times that, in the order of their lowest corners, x fastest;
+/// `interior_growth` is K, 0: all of one size.
+/// Errors: kInvalidArgument for a spacing that is not > 0, K below 0, a lattice of more than kMostPolygridPlaces, or a solid without a
 ///         node; kCancelled.
 Result<Polygrid> make_polygrid(const SignedDistance& solid,
                                double spacing_mm,
+                               double interior_growth,
                                std::stop_token stop);
 
 }  // namespace opaline::render

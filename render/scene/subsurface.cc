@@ -74,7 +74,8 @@ Result<std::unique_ptr<Subsurface>> set_up(TetMesh mesh,
     return make_elements_subsurface(std::move(mesh), setting);
   }
   if (method == Discretisation::kGraph) return make_graph_subsurface(std::move(mesh), setting);
-  auto grid = make_polygrid(setting.solid, spacing_mm, std::move(stop));
+  auto grid =
+      make_polygrid(setting.solid, spacing_mm, setting.options.interior_growth, std::move(stop));
   if (!grid) return grid.error();
   return make_polygrid_subsurface(*std::move(grid), std::move(mesh), setting);
 }

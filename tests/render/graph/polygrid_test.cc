@@ -19,21 +19,21 @@ using reconstruct::diffusion::make_boundary;
 using reconstruct::diffusion::Termination;
 using ::testing::HasSubstr;
 
-Polygrid grid_of(std::string_view shape, double spacing) {
+Polygrid grid_of(std::string_view shape, double spacing, double growth = 0.0) {
   const auto solid = make_shape(shape, 20.0);
-  auto grid = make_polygrid(**solid, spacing, {});
+  auto grid = make_polygrid(**solid, spacing, growth, {});
   EXPECT_TRUE(grid);
   return *std::move(grid);
 }
 
 /// Relative RMS error of the surface's fluence on the lit sphere of 10 mm.
-double sphere_error(double spacing) {
+double sphere_error(double spacing, double growth = 0.0) {
   constexpr double kAbsorption = 0.01;
   const auto boundary = *make_boundary(BoundaryModel::kTwoMoment, 1.3);
   Optics optics;
   optics.absorption.fill(kAbsorption);
   optics.diffusion.fill(1.0 / (3.0 * (1.0 + kAbsorption)));
-  const Polygrid grid = grid_of("sphere", spacing);
+  const Polygrid grid = grid_of("sphere", spacing, growth);
   TwoPoint<double, Polygrid> diffusion(grid, boundary);
   EXPECT_TRUE(diffusion.set_material(std::vector(grid.inner.size(), optics)));
   std::vector<std::array<float, 3>> q(grid.surface.size());
@@ -94,15 +94,54 @@ TEST(Polygrid, LinksGoBothWays) {
   }
 }
 
+// K = 0.3 leaves the surface's nodes as they are and joins what lies deep: finer than an even lattice, it has fewer nodes and is nearer to the exact
+// solution.
+TEST(Polygrid, AdaptiveWithDepthItIsMoreAccurateWithFewerNodes) {
+  const Polygrid even = grid_of("sphere", 0.5);
+  const Polygrid adaptive = grid_of("sphere", 0.5, 0.3);
+  EXPECT_EQ(adaptive.surface.size(), even.surface.size());
+  EXPECT_LT(adaptive.inner.size(), even.inner.size() / 2);
+  const Polygrid finer = grid_of("sphere", 0.4, 0.3);
+  EXPECT_LT(finer.inner.size(), 0.8 * static_cast<double>(even.inner.size()));
+  EXPECT_LT(sphere_error(0.4, 0.3), sphere_error(0.5));
+  EXPECT_LT(sphere_error(0.5, 0.3), sphere_error(0.8, 0.3));
+}
+
+TEST(Polygrid, AdaptiveCellsFillWhatEvenOnesDoAndMeetFaceToFace) {
+  const Polygrid even = grid_of("sphere", 0.5);
+  const Polygrid adaptive = grid_of("sphere", 0.5, 1.0);
+  double volume = 0.0;
+  double all = 0.0;
+  double largest = 0.0;
+  for (const double v : adaptive.volumes) volume += v;
+  for (const double v : even.volumes) all += v;
+  for (const double v : adaptive.volumes) largest = std::max(largest, v);
+  EXPECT_NEAR(volume, all, 1e-9 * all);
+  EXPECT_GE(largest, 64.0 * 0.125 * (1.0 - 1e-9));
+  for (std::size_t i = 0; i < adaptive.links.size(); ++i) {
+    for (const auto& link : adaptive.links[i]) {
+      if (link.inner < 0) continue;
+      const auto& back = adaptive.links[link.inner];
+      const auto found = std::ranges::find(back, static_cast<int>(i), &Polygrid::Link::inner);
+      ASSERT_NE(found, back.end());
+      EXPECT_EQ(std::ranges::count(back, static_cast<int>(i), &Polygrid::Link::inner), 1);
+      EXPECT_NEAR(found->area, link.area, 1e-12);
+      EXPECT_LE(std::abs(std::log2(found->reach / link.reach)), 1.0 + 1e-9);
+    }
+  }
+}
+
 TEST(Polygrid, WhatCannotBeDoneIsRefusedWithTheReason) {
   const auto sphere = make_shape("sphere", 20.0);
-  EXPECT_THAT(make_polygrid(**sphere, 0.0, {}).error().message, HasSubstr("expected > 0"));
-  EXPECT_THAT(make_polygrid(**sphere, 1e-3, {}).error().message, HasSubstr("larger spacing"));
+  EXPECT_THAT(make_polygrid(**sphere, 0.0, 0.0, {}).error().message, HasSubstr("expected > 0"));
+  EXPECT_THAT(make_polygrid(**sphere, 1.0, -0.1, {}).error().message, HasSubstr("at least 0"));
+  EXPECT_THAT(make_polygrid(**sphere, 1e-3, 0.0, {}).error().message, HasSubstr("larger spacing"));
   const auto ring = make_shape("torus", 0.1);  // a node in its hole, none in it
-  EXPECT_THAT(make_polygrid(**ring, 1.0, {}).error().message, HasSubstr("smaller spacing"));
+  EXPECT_THAT(make_polygrid(**ring, 1.0, 0.0, {}).error().message, HasSubstr("smaller spacing"));
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_EQ(make_polygrid(**sphere, 0.5, stop.get_token()).error().code, ErrorCode::kCancelled);
+  EXPECT_EQ(make_polygrid(**sphere, 0.5, 0.0, stop.get_token()).error().code,
+            ErrorCode::kCancelled);
 }
 
 }  // namespace
