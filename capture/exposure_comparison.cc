@@ -13,9 +13,12 @@ namespace {
 constexpr int kTile = 16;
 constexpr double kFewestSamples = 200.0;
 constexpr double kFewestInTile = 64.0;
-constexpr double kAboveNoise = 3.0;     // deviations of a sample of the shorter exposure
-constexpr double kBelowClipping = 4.0;  // deviations
-constexpr double kWild = 6.0;           // deviations
+constexpr double kAboveNoise = 3.0;  // deviations of a sample of the shorter exposure
+constexpr double kBelowClipping =
+    4.0;  // deviations of every sample; twice as many, of the mean around it
+constexpr double kStandsOut = 6.0;  // deviations of a tile
+constexpr double kDarkest = 0.1;    // of a tile's light, for a logarithm
+constexpr double kWild = 6.0;       // deviations
 constexpr std::size_t kChannels = 3;
 constexpr std::size_t kNumbers = 2 * kChannels + 2;  // g and h of each channel, dx, dy
 constexpr std::size_t kShiftX = 2 * kChannels;
@@ -43,6 +46,7 @@ Matrix inverse_of(const Matrix& a) {
 struct ChannelSums {
   double samples = 0.0;
   double bb = 0.0, bl = 0.0, ll = 0.0, bd = 0.0, ld = 0.0;
+  double inverse_signal = 0.0;
 };
 
 }  // namespace
@@ -58,7 +62,6 @@ struct ExposureComparer::Sums {
   std::array<ChannelSums, kChannels> all{};
   Matrix normal;
   std::vector<double> right;
-  double inverse_signal = 0.0;
   double weight = 0.0;
 
   void add(const Sample& s, double logarithm, std::size_t tile, std::size_t c) {
@@ -77,9 +80,9 @@ struct ExposureComparer::Sums {
       sums->ll += s.weight * l * l;
       sums->bd += s.weight * s.around * s.difference;
       sums->ld += s.weight * l * s.difference;
+      sums->inverse_signal += s.weight * s.around * s.around / s.signal;
     }
     weight += s.weight * s.around * s.around;
-    inverse_signal += s.weight * s.around * s.around / s.signal;
   }
 };
 
@@ -138,30 +141,29 @@ struct ExposureComparer::Fit {
     const double changed = std::sqrt(squares / sums.weight);
     return {changed, changed / length * std::sqrt(along)};
   }
-  /// The tile that stands out most of its noise.
-  std::optional<ExposureComparison::Part> part() const {
-    std::optional<ExposureComparison::Part> worst;
-    double most = 0.0;
+  /// The tiles that stand out of their noise.
+  std::vector<ExposureComparison::Part> parts() const {
+    std::vector<ExposureComparison::Part> found;
     for (std::size_t t = 0; t < sums.tiles.size(); ++t) {
       double left = 0.0;
       double squares = 0.0;
       double samples = 0.0;
+      double inverse_signal = 0.0;
       for (std::size_t c = 0; c < kChannels; ++c) {
         const ChannelSums& s = sums.tiles[t][c];
         left += s.bd - numbers[2 * c] * s.bb - numbers[2 * c + 1] * s.bl;
         squares += s.bb;
         samples += s.samples;
+        inverse_signal += s.inverse_signal;
       }
-      if (samples < kFewestInTile) continue;
-      const double stands_out = std::abs(left) / std::sqrt(squares);
-      if (stands_out <= most) continue;
-      most = stands_out;
+      if (samples < kFewestInTile || std::abs(left) < kStandsOut * std::sqrt(squares)) continue;
       const int tile = static_cast<int>(t);
-      worst = {{left / squares, 1.0 / std::sqrt(squares)},
-               tile % sums.across * kTile + kTile / 2,
-               tile / sums.across * kTile + kTile / 2};
+      found.push_back({{left / squares, 1.0 / std::sqrt(squares)},
+                       tile % sums.across * kTile + kTile / 2,
+                       tile / sums.across * kTile + kTile / 2,
+                       inverse_signal / squares});
     }
-    return worst;
+    return found;
   }
 
   const Sums& sums;
@@ -176,8 +178,7 @@ bool ExposureComparison::Figure::exceeds(double limit, double deviations) const 
 ExposureComparer::ExposureComparer(const CameraCalibration& camera)
     : camera_(camera),
       electrons_(electrons_by_code(camera)),
-      clipping_code_(clipping_code(camera)),
-      clipping_electrons_(electrons_from_code(camera, clipping_code_).signal) {}
+      clipping_electrons_(electrons_from_code(camera, clipping_code(camera)).signal) {}
 
 std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
     const ExposurePair& shorter,
@@ -185,7 +186,8 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
     const Image<std::uint8_t>& footprint,
     int x,
     int y,
-    int channel) const {
+    int channel,
+    double tile_rate) const {
   const int width = footprint.width();
   const auto place = [&](int u, int v) {
     return 3 * (static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u)) +
@@ -198,15 +200,18 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
       const int px = x + u - 1;
       const int py = y + v - 1;
       const std::uint16_t code = longer.light->at(px, py, channel);
-      if (footprint.at(px, py) == 0 || code >= clipping_code_) return std::nullopt;
-      const double black = black_of(longer, place(px, py), electrons_).electrons.signal;
       const double with_leak = electrons_[code].signal;
+      const double deviation =
+          std::sqrt(noise_variance(camera_, with_leak, electrons_[code].per_code));
+      if (footprint.at(px, py) == 0 || with_leak + kBelowClipping * deviation > clipping_electrons_)
+        return std::nullopt;
+      const double black = black_of(longer, place(px, py), electrons_).electrons.signal;
       light[v][u] = with_leak - black * longer.light_seconds / longer.black_seconds;
       if (u != 1 || v != 1) raw += with_leak / 8.0;
     }
   }
   const Electrons& own = electrons_[longer.light->at(x, y, channel)];
-  if (raw + kBelowClipping * std::sqrt(noise_variance(camera_, raw, own.per_code)) >
+  if (raw + 2.0 * kBelowClipping * std::sqrt(noise_variance(camera_, raw, own.per_code)) >
       clipping_electrons_)
     return std::nullopt;
 
@@ -217,21 +222,24 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
                          light[2][0] + light[2][1] + light[2][2]) /
                         8.0 / longer.light_seconds;
   // Of a rate: noise of a frame and of its black, around what the neighbours say.
-  const auto variance_of = [&](const ExposurePair& pair, const Electrons& dark, double frames) {
-    const double t = pair.light_seconds;
-    const double scale = t / pair.black_seconds;
-    const double leak = std::max(dark.signal, 0.0);
-    return (noise_variance(camera_, around * t + leak * scale, own.per_code) +
-            scale * scale * noise_variance(camera_, leak, dark.per_code) / frames) /
-           (t * t);
-  };
-  const double brief_variance = variance_of(shorter, brief_black, brief_blacks);
-  if (around < kAboveNoise * std::sqrt(brief_variance)) return std::nullopt;
-  const double variance = brief_variance + variance_of(longer, black, blacks);
+  const auto variance_of =
+      [&](const ExposurePair& pair, double rate, const Electrons& dark, double frames) {
+        const double t = pair.light_seconds;
+        const double scale = t / pair.black_seconds;
+        const double leak = std::max(dark.signal, 0.0);
+        return (noise_variance(camera_, rate * t + leak * scale, own.per_code) +
+                scale * scale * noise_variance(camera_, leak, dark.per_code) / frames) /
+               (t * t);
+      };
+  if (tile_rate <
+      kAboveNoise * std::sqrt(variance_of(shorter, tile_rate, brief_black, brief_blacks)))
+    return std::nullopt;
+  const double variance = variance_of(shorter, around, brief_black, brief_blacks) +
+                          variance_of(longer, around, black, blacks);
   const double brief_rate =
       (brief.signal - brief_black.signal * shorter.light_seconds / shorter.black_seconds) /
       shorter.light_seconds;
-  const double most = kWild * std::sqrt(variance) + around;
+  const double most = kWild * std::sqrt(variance) + std::max(around, tile_rate);
   Sample sample;
   sample.difference = std::clamp(brief_rate - light[1][1] / longer.light_seconds, -most, most);
   sample.around = around;
@@ -241,22 +249,50 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
   sample.slope_x = eighth * (row(0) + 2.0 * row(1) + row(2));
   sample.slope_y = eighth * (column(0) + 2.0 * column(1) + column(2));
   sample.weight = 1.0 / variance;
-  sample.signal = around * shorter.light_seconds / camera_.full_scale_electrons();
+  sample.level = std::max(around, kDarkest * tile_rate) * longer.light_seconds /
+                 camera_.full_scale_electrons();
+  sample.signal = tile_rate * shorter.light_seconds / camera_.full_scale_electrons();
   return sample;
+}
+
+// Clipped pixels count as what they clip at.
+std::vector<std::array<double, 3>> ExposureComparer::tile_rates(
+    const ExposurePair& longer, const Image<std::uint8_t>& footprint) const {
+  const int across = (footprint.width() + kTile - 1) / kTile;
+  const int down = (footprint.height() + kTile - 1) / kTile;
+  std::vector<std::array<double, 3>> rates(static_cast<std::size_t>(across) * down);
+  std::vector<double> pixels(rates.size());
+  std::size_t place = 0;
+  for (int y = 0; y < footprint.height(); ++y) {
+    for (int x = 0; x < footprint.width(); ++x, ++place) {
+      if (footprint.at(x, y) == 0) continue;
+      const auto tile = static_cast<std::size_t>(y / kTile * across + x / kTile);
+      pixels[tile] += 1.0;
+      for (std::size_t c = 0; c < kChannels; ++c) {
+        const std::size_t sample = kChannels * place + c;
+        const double light = electrons_[longer.light->samples()[sample]].signal;
+        const double black = black_of(longer, sample, electrons_).electrons.signal;
+        const double net = light - black * longer.light_seconds / longer.black_seconds;
+        rates[tile][c] += (net / longer.light_seconds - rates[tile][c]) / pixels[tile];
+      }
+    }
+  }
+  return rates;
 }
 
 ExposureComparer::Sums ExposureComparer::sums_of(const ExposurePair& shorter,
                                                  const ExposurePair& longer,
                                                  const Image<std::uint8_t>& footprint) const {
   Sums sums(footprint.width(), footprint.height());
-  const double full = camera_.full_scale_electrons() / longer.light_seconds;
+  const auto rates = tile_rates(longer, footprint);
   for (int y = 1; y + 1 < footprint.height(); ++y) {
     for (int x = 1; x + 1 < footprint.width(); ++x) {
       if (footprint.at(x, y) == 0) continue;
-      const int tile = y / kTile * sums.across + x / kTile;
+      const auto tile = static_cast<std::size_t>(y / kTile * sums.across + x / kTile);
       for (int c = 0; c < 3; ++c) {
-        if (const auto s = sample_at(shorter, longer, footprint, x, y, c))
-          sums.add(*s, std::log(s->around / full), static_cast<std::size_t>(tile), c);
+        const double rate = rates[tile][static_cast<std::size_t>(c)];
+        if (const auto s = sample_at(shorter, longer, footprint, x, y, c, rate))
+          sums.add(*s, std::log(s->level), tile, static_cast<std::size_t>(c));
       }
     }
   }
@@ -277,8 +313,9 @@ std::optional<ExposureComparison> ExposureComparer::compare(
   found.levels = fit.levels();
   found.shift = fit.shift();
   found.shift_px = std::hypot(fit.numbers[kShiftX], fit.numbers[kShiftY]);
-  found.part = fit.part();
-  found.inverse_signal = sums.inverse_signal / sums.weight;
+  found.parts = fit.parts();
+  for (const ChannelSums& channel : sums.all)
+    found.inverse_signal += channel.inverse_signal / sums.weight;
   return found;
 }
 

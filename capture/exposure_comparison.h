@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "base/image.h"
 #include "capture/calibration.h"
@@ -19,19 +20,20 @@ struct ExposureComparison {
     /// Whether it is above a limit, and not by noise.
     bool exceeds(double limit, double deviations) const;
   };
-  /// Where the two differ in part, after what all of it has in common is taken away: the worst 16 x 16 pixels.
+  /// Where the two differ in part, after what all of it has in common is taken away: light of 16 x 16 pixels.
   struct Part {
     Figure light;  ///< relative
     int x = 0;     ///< its middle, px
     int y = 0;
+    double inverse_signal = 0.0;  ///< as below, of this part
   };
   /// Of the shorter exposure over the longer one, less 1; by channel, none of a channel without enough usable pixels.
   std::array<std::optional<Figure>, 3> light;
   Figure levels;        ///< by how much, relative, bright and dark parts disagree (RMS)
   Figure shift;         ///< by how much, relative, light is changed by the picture's shift (RMS)
   double shift_px = 0;  ///< how far that is
-  std::optional<Part> part;
-  /// Of the shorter exposure's signal over full scale, mean of its inverse: what an error of the response does there.
+  std::vector<Part> parts;  ///< six deviations off, or more
+  /// Of the shorter exposure's signal over full scale, mean of its inverse: what an error of black or response, in parts of full scale, does there.
   double inverse_signal = 0.0;
 };
 
@@ -41,8 +43,8 @@ struct ExposureComparison {
 ///   a - b = g b + h b ln(b / full scale) + dx db/dx + dy db/dy + noise
 ///
 /// by least squares weighted with the camera's noise model: g, h by channel (light, and an error of the response's exponent), one shift
-/// (dx, dy) of the picture. On the right b and its slopes come from the eight pixels around, so that no noise stands on both sides, and which
-/// pixels count does not follow their own noise either. What g and h leave is averaged over tiles of 16 x 16 pixels: light that has
+/// (dx, dy) of the picture. On the right b and its slopes come from the eight pixels around, so that no noise stands on both sides. Which
+/// pixels are bright enough is told by tiles of 16 x 16, so that it does not follow noise either. What g and h leave is averaged over tiles of 16 x 16 pixels: light that has
 /// changed in one place. Single wild samples count as at most their own light.
 ///
 /// `footprint` marks the pixels (1) to look at. None where fewer than 200 samples can be compared.
@@ -60,7 +62,8 @@ class ExposureComparer {
     double slope_x = 0.0;
     double slope_y = 0.0;
     double weight = 0.0;
-    double signal = 0.0;  ///< of the shorter exposure, over full scale
+    double level = 0.0;   ///< b over full scale, > 0
+    double signal = 0.0;  ///< of the shorter exposure around, over full scale
   };
   struct Sums;
   struct Fit;
@@ -69,14 +72,16 @@ class ExposureComparer {
                                   const Image<std::uint8_t>& footprint,
                                   int x,
                                   int y,
-                                  int channel) const;
+                                  int channel,
+                                  double tile_rate) const;
+  std::vector<std::array<double, 3>> tile_rates(const ExposurePair& longer,
+                                                const Image<std::uint8_t>& footprint) const;
   Sums sums_of(const ExposurePair& shorter,
                const ExposurePair& longer,
                const Image<std::uint8_t>& footprint) const;
 
   CameraCalibration camera_;
   std::vector<Electrons> electrons_;  // by code
-  double clipping_code_;
   double clipping_electrons_;
 };
 

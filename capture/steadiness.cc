@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace opaline::capture {
 namespace {
@@ -11,17 +12,27 @@ namespace {
 constexpr double kLight = 0.01;
 constexpr double kInPart = 0.03;
 constexpr double kLevels = 0.03;
-constexpr double kInOnePlace = 2.0;       // times what a shift changes: no shift
-constexpr double kKnown = 0.25;           // of what exposures are known to disagree by
-constexpr double kCurve = 3.0;            // times as much, through a response curve
-constexpr double kCurveError = 0.01;      // of full scale
-constexpr double kDeviations = 5.0;       // of one figure
-constexpr double kDeviationsOfAll = 6.0;  // of the worst of many
-constexpr double kTrend = 0.95;           // of the variance, on a line over time
-constexpr double kSteps = 0.7;  // of the range, the largest of many steps in one direction
+constexpr double kInOnePlace = 2.0;   // times what a shift changes: no shift
+constexpr double kKnown = 0.25;       // of what exposures are known to disagree by
+constexpr double kCurve = 3.0;        // times as much, through a response curve
+constexpr double kBlackError = 0.03;  // codes that black is told to, and what rounding adds
+constexpr double kCurveError = 0.01;  // of full scale
+constexpr double kDeviations = 5.0;   // of one figure
+constexpr double kTrend = 0.95;       // of the variance, on a line over time
+constexpr double kSteps = 0.7;        // of the range, the largest of many steps in one direction
 constexpr std::size_t kTakes = 3;
 
 double logarithm(double light) { return std::log1p(std::max(light, -0.9)); }
+
+// Codes are whole: a mean of them is off by up to exp(-2 pi^2 s^2) / pi codes where noise of s codes is all that varies (Widrow and
+// Kollar 2008, Sec. 4). Of full scale.
+double code_error(const CameraCalibration& camera) {
+  if (camera.response.kind != ResponseCurve::Kind::kLinear) return kCurveError;
+  const double noise = camera.read_noise_electrons / camera.gain_electrons_per_code;
+  const double rounding =
+      std::exp(-2.0 * std::numbers::pi * std::numbers::pi * noise * noise) / std::numbers::pi;
+  return (kBlackError + rounding) / (camera.max_code() - camera.black_level);
+}
 
 std::string between(const TimedExposure& a, const TimedExposure& b) {
   return fmt::format(
@@ -84,7 +95,7 @@ struct SteadinessCheck::Chain {
 SteadinessCheck::SteadinessCheck(const CameraCalibration& camera)
     : comparer_(camera),
       scale_(camera.response.kind == ResponseCurve::Kind::kLinear ? 1.0 : kCurve),
-      response_error_(camera.response.kind == ResponseCurve::Kind::kLinear ? 0.0 : kCurveError) {}
+      code_error_(code_error(camera)) {}
 
 SteadinessCheck::Chain SteadinessCheck::chain_of(std::span<const TimedExposure> exposures,
                                                  const Image<std::uint8_t>& footprint) const {
@@ -100,24 +111,33 @@ SteadinessCheck::Chain SteadinessCheck::chain_of(std::span<const TimedExposure> 
   return chain;
 }
 
-std::optional<UnsteadyLight> SteadinessCheck::motion_in(const Chain& chain, double limit) {
+const SteadinessCheck::Part* SteadinessCheck::worst_of(const ExposureComparison& step) const {
+  const Part* worst = nullptr;
+  for (const Part& part : step.parts) {
+    const double limit = scale_ * kInPart + 2.0 * code_error_ * part.inverse_signal;
+    const double size = std::abs(part.light.value);
+    if (size > limit && (worst == nullptr || size > std::abs(worst->light.value))) worst = &part;
+  }
+  return worst;
+}
+
+std::optional<UnsteadyLight> SteadinessCheck::motion_in(const Chain& chain, double limit) const {
   for (std::size_t i = 0; i < chain.steps.size(); ++i) {
     if (!chain.steps[i]) continue;
     const ExposureComparison& step = *chain.steps[i];
     const std::string when = between(chain.exposures[i], chain.exposures[i + 1]);
     const bool moved = step.shift.exceeds(limit, kDeviations);
-    const bool in_part =
-        step.part && step.part->light.exceeds(limit / kLight * kInPart, kDeviationsOfAll);
-    if (in_part && (!moved || std::abs(step.part->light.value) > kInOnePlace * step.shift.value))
+    const Part* part = worst_of(step);
+    if (part != nullptr && (!moved || std::abs(part->light.value) > kInOnePlace * step.shift.value))
       return UnsteadyLight{Unsteadiness::kMotion,
-                           std::abs(step.part->light.value),
-                           step.part->light.deviation,
-                           0.0,
-                           std::pair(step.part->x, step.part->y),
+                           std::abs(part->light.value),
+                           part->light.deviation,
+                           moved ? step.shift_px : 0.0,
+                           std::pair(part->x, part->y),
                            fmt::format("motion: around pixel ({}, {}) light differs by {:.2g} % {}",
-                                       step.part->x,
-                                       step.part->y,
-                                       100.0 * std::abs(step.part->light.value),
+                                       part->x,
+                                       part->y,
+                                       100.0 * std::abs(part->light.value),
                                        when)};
     if (moved)
       return UnsteadyLight{
@@ -237,7 +257,7 @@ bool SteadinessCheck::same_each_time(double limit) const {
 }
 
 double SteadinessCheck::light_limit(const Chain& chain) const {
-  return scale_ * kLight + 2.0 * response_error_ * chain.inverse_signal;
+  return scale_ * kLight + 2.0 * code_error_ * chain.inverse_signal;
 }
 
 std::optional<UnsteadyLight> SteadinessCheck::moved(const TimedExposure& before,

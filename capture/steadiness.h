@@ -30,7 +30,7 @@ struct UnsteadyLight {
   Unsteadiness kind = Unsteadiness::kFlicker;
   double size = 0.0;       ///< relative, of the light; > 0
   double deviation = 0.0;  ///< of it, from the frames' noise
-  double shift_px = 0.0;   ///< of kMotion, where all of the picture has shifted; else 0
+  double shift_px = 0.0;   ///< of kMotion, where all of the picture may have shifted; else 0
   std::optional<std::pair<int, int>> where;  ///< of kMotion in one place: its middle, px
   std::string message;  ///< "flicker: exposures differ by 3.1 % (0.02 % noise)"
 };
@@ -47,7 +47,8 @@ struct TimedExposure {
 ///
 ///   1 % of the light               flicker and drift, from the brightest to the dimmest exposure; what a shift of the picture changes
 ///   3 %                            of 16 x 16 pixels; levels
-///   three times as much            through a response curve, and 1 % of full scale more, which it is known to
+///   three times as much            through a response curve
+///   more in dim light              what 0.03 codes do, to which black is told, and rounding where codes barely vary; through a curve 1 % of full scale
 ///
 /// the limit that a calibration's `check` has for the light that two exposures tell.
 ///
@@ -79,7 +80,9 @@ class SteadinessCheck {
   double light_limit(const Chain& chain) const;
   Chain chain_of(std::span<const TimedExposure> exposures,
                  const Image<std::uint8_t>& footprint) const;
-  static std::optional<UnsteadyLight> motion_in(const Chain& chain, double limit);
+  using Part = ExposureComparison::Part;
+  const Part* worst_of(const ExposureComparison& step) const;
+  std::optional<UnsteadyLight> motion_in(const Chain& chain, double limit) const;
   std::optional<UnsteadyLight> light_in(const Chain& chain, double limit) const;
   std::optional<UnsteadyLight> levels_in(const Chain& chain, double limit) const;
   std::array<double, 4> known(const TimedExposure& a, const TimedExposure& b) const;
@@ -87,7 +90,7 @@ class SteadinessCheck {
 
   ExposureComparer comparer_;
   double scale_;                  // of the limits
-  double response_error_;         // of full scale
+  double code_error_;             // of black or response, of full scale
   std::vector<Signature> takes_;  // unsteady ones of this light
   Signature known_;  // by exposures, what they show each time: light by channel, levels
 };

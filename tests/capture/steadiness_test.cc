@@ -36,7 +36,7 @@ struct Taken {
 /// Takes brackets of the spot by the camera's model as calibration.h has it, with noise of its own.
 class Bench {
  public:
-  explicit Bench(double gamma = 1.0) {
+  explicit Bench(double gamma = 1.0, CameraCalibration camera = {}) : camera_(std::move(camera)) {
     camera_.model.width = kWidth;
     camera_.model.height = kHeight;
     if (gamma != 1.0) camera_.response = {ResponseCurve::Kind::kGamma, gamma, {}};
@@ -74,7 +74,9 @@ class Bench {
         const double rate = taken.light * scene(x - taken.dx, y) * (dim ? 0.9 : 1.0) + kLeak;
         for (int c = 0; c < 3; ++c) {
           std::poisson_distribution<int> shot(rate * seconds * taken.seconds_off);
-          const double s = (shot(random_) + read(random_)) / camera_.full_scale_electrons();
+          const double well = camera_.full_well_electrons > 0.0 ? camera_.full_well_electrons : 1e9;
+          const double electrons = std::min<double>(shot(random_), well) + read(random_);
+          const double s = electrons / camera_.full_scale_electrons();
           const double gamma = camera_.response.kind == ResponseCurve::Kind::kGamma
                                    ? camera_.response.gamma * taken.gamma_off
                                    : 1.0;
@@ -115,6 +117,22 @@ TEST(Steadiness, RaisesNoFalseAlarm) {
   Bench curve(2.2);
   for (int i = 0; i < 30; ++i) {
     const auto verdict = curve.judge(kSteady);
+    EXPECT_FALSE(verdict.unsteady) << verdict.unsteady->message;
+  }
+}
+
+// Highlights of a few pixels that fill their wells just below the highest code, and codes so coarse that the read noise is rounded away.
+TEST(Steadiness, RaisesNoFalseAlarmAtHighlightsNorByCoarseCodes) {
+  CameraCalibration coarse;
+  coarse.gain_electrons_per_code = 7.5;
+  coarse.full_well_electrons = 30000.0;
+  Bench bench(1.0, coarse);
+  const Scene glossy = [](double x, double y) {
+    const bool highlight = std::fmod(x, 11.0) < 1.0 && std::fmod(y, 13.0) < 2.0;
+    return 0.1 * spot(x, y) + (highlight ? 3e6 : 0.0);
+  };
+  for (int i = 0; i < 40; ++i) {
+    const auto verdict = bench.judge(kSteady, glossy);
     EXPECT_FALSE(verdict.unsteady) << verdict.unsteady->message;
   }
 }
