@@ -74,12 +74,11 @@ double triad_bytes_per_second() {
 /// Fields of 16 right-hand sides in the working precision ("number"), z in the precision that it is stored in; on the
 /// finest level of black cells only, which are half of them.
 ///
-///   an iteration   restriction reads r; prolongation reads r, writes z; the update reads z, p, d, r, writes p, d, r;
+///   an iteration   restriction reads r; prolongation reads r, writes z; the update reads z, s, d, r, writes s, d, r;
 ///                  8, 8 and 5 coefficients a cell; a seventh of whole fields and 17 coefficients for the coarser
 ///                  levels of the first two
-///   a replacement  the one at 1e-5 reads x, d, p, b, writes x and r; the last reads x, d, p, b and writes x;
-///                  7 coefficients in float64 each
-///   the start      looks at b and x, reads b, writes red x and r, 7 coefficients in float64
+///   the end        reads x, both d, b and writes x; 7 coefficients in float64
+///   the start      looks at b and x, reads b, writes r; 6 coefficients in float64 and 1 rounded
 ///   the set-up     reads kappa and sigma_a, writes 7 coefficients in float64, reads them, writes 9; an eighth more
 double bytes_counted(const ForwardCase& problem,
                      int iterations,
@@ -93,10 +92,10 @@ double bytes_counted(const ForwardCase& problem,
   const double finest = values * (1.0 * number + 0.5 * stored) + cells * 16.0 * number;
   const double coarser = (values * (2.0 * number + stored) + cells * 17.0 * number) / 7.0;
   const double update = values * (3.0 * number + 0.5 * stored) + cells * 5.0 * number;
-  const double replacements = values * (6.0 * kExact + 2.5 * number) + cells * 14.0 * kExact;
-  const double start = values * (4.0 * kExact + 0.5 * number) + cells * 7.0 * kExact;
+  const double end = values * (3.0 * kExact + 1.0 * number) + cells * 7.0 * kExact;
+  const double start = values * (3.0 * kExact + 0.5 * number) + cells * (6.0 * kExact + number);
   const double setup = cells * (16.0 * kExact + 9.0 * number) * 8.0 / 7.0;
-  return iterations * (finest + coarser + update) + replacements + start + setup;
+  return iterations * (finest + coarser + update) + end + start + setup;
 }
 
 struct Timed {

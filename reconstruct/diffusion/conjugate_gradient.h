@@ -29,9 +29,9 @@ SolveSummary summarise(Termination termination, int iterations, double relative_
 /// its own step lengths. (Hestenes & Stiefel 1952; Saad, Iterative Methods for Sparse Linear
 /// Systems, 2nd ed., Algorithm 9.1.)
 ///
-/// The working precision may be single: whenever the recurred residual has fallen by 1e-5, and
-/// before convergence is believed, it is replaced by b - K x in float64 (van der Vorst & Ye 2000,
-/// SIAM J. Sci. Comput. 22, section 3), so the solution reaches float64 accuracy.
+/// The working precision may be single: whenever the recurred residual has fallen as far as the
+/// passes trust it, and before convergence is believed, it is replaced by b - K x in float64 (van der
+/// Vorst & Ye 2000, SIAM J. Sci. Comput. 22, section 3), so the solution reaches float64 accuracy.
 ///
 /// b_norms: ||b||^2 of each right-hand side. A right-hand side of zero must start from x = 0.
 /// Returns kBreakdown when three replacements in a row bring no progress or a number stops being
@@ -41,8 +41,8 @@ SolveSummary conjugate_gradient(P& passes,
                                 std::span<const double> b_norms,
                                 const SolveOptions& options,
                                 const std::stop_token& stop) {
-  constexpr double kReplaceAfter = 1e-5;
   double replaced = worst_ratio(passes.true_residual(), b_norms);
+  if (replaced <= options.tolerance) replaced = worst_ratio(passes.true_norm(), b_norms);
   if (replaced <= options.tolerance) return summarise(Termination::kConverged, 0, replaced);
   bool restart = true;
   int stalls = 0;
@@ -53,7 +53,7 @@ SolveSummary conjugate_gradient(P& passes,
     const double recurred = worst_ratio(passes.update_norm(), b_norms);
     if (!std::isfinite(recurred)) return summarise(Termination::kBreakdown, iteration, recurred);
     restart = false;
-    if (recurred > std::max(options.tolerance, kReplaceAfter * replaced)) continue;
+    if (recurred > std::max(options.tolerance, passes.trusted_fall() * replaced)) continue;
     if (recurred <= options.tolerance) {
       const double reached = worst_ratio(passes.true_norm(), b_norms);
       if (reached <= options.tolerance)

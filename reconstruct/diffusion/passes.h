@@ -17,7 +17,10 @@ namespace opaline::reconstruct::diffusion {
 /// true_residual()       x += d, d = 0, r = b - K x in float64, then rounded to the working
 /// precision.
 ///                       Returns ||r||^2 of every right-hand side, taken in float64.
+///                       Where x was zero, x may be left for true_norm() to complete, as long as r is of what it will be.
 /// true_norm()           the same, but r need not be kept: true_residual() comes before anything that reads it.
+/// trusted_fall()        how far ||r|| may fall from one true_residual() to the next: 1e-5 where d is rounded to
+///                       single precision and r not told.
 /// smooth_restrict(l)    for l < levels() - 1: one red-black Gauss-Seidel sweep on K z = r from z =
 /// 0, and the residual
 ///                       it leaves handed to r of level l + 1:
@@ -56,6 +59,7 @@ concept DiffusionPasses = requires(P passes, int level, bool restart) {
   { passes.levels() } -> std::convertible_to<int>;
   { passes.true_residual() } -> std::convertible_to<std::span<const double>>;
   { passes.true_norm() } -> std::convertible_to<std::span<const double>>;
+  { passes.trusted_fall() } -> std::convertible_to<double>;
   passes.smooth_restrict(level);
   passes.prolong_smooth(level);
   passes.apply_dot(restart);

@@ -17,6 +17,7 @@ class ReferencePasses {
   int levels() const { return static_cast<int>(levels_.size()); }
   std::span<const double> true_residual();
   std::span<const double> true_norm() { return true_residual(); }
+  double trusted_fall() const { return 1e-5; }
   void smooth_restrict(int level);
   void prolong_smooth(int level);
   void apply_dot(bool restart);

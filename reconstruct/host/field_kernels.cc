@@ -14,7 +14,7 @@ namespace opaline::reconstruct::host::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Numbers between what is read and what is asked for: lines follow each other.
-constexpr std::ptrdiff_t kAhead = 256;
+constexpr std::ptrdiff_t kAhead = 64;
 
 using D = hn::ScalableTag<double>;
 using V = hn::Vec<D>;
@@ -64,10 +64,14 @@ struct Cells {
   M all;
   M later;
   M inner;
+};
 
-  HWY_INLINE Cells(M colour, int i, int nx) : all(colour), later(colour), inner(colour) {
+/// Those at either end of a line, where a vector may reach beyond it.
+struct EdgeCells : Cells {
+  HWY_INLINE EdgeCells(M colour, int i, int nx) : Cells{colour, colour, colour} {
     const D d;
-    const auto left = [&](int cells) { return hn::FirstN(d, static_cast<std::size_t>(cells)); };
+    const auto left = [&](int cells)
+                          HWY_ATTR { return hn::FirstN(d, static_cast<std::size_t>(cells)); };
     if (i + static_cast<int>(hn::Lanes(d)) >= nx) {
       all = later = hn::And(colour, left(nx - i));
       inner = hn::And(colour, left(nx - 1 - i));
@@ -76,75 +80,209 @@ struct Cells {
   }
 };
 
-/// b - K x in those cells, whose neighbours have the other colour: nothing else is read.
-HWY_INLINE V residual_at(const FieldLine& l, int i, const Cells& cells) {
-  const D d;
-  const auto at = [&](const double* row) { return hn::MaskedLoad(cells.all, d, row + i); };
-  V a = at(l.b);
-  if (l.x == nullptr) return a;
-  a = hn::NegMulAdd(at(l.diagonal), at(l.x), a);
-  a = hn::MulAdd(
-      hn::MaskedLoad(cells.later, d, l.gx + i - 1), hn::MaskedLoad(cells.later, d, l.x + i - 1), a);
-  a = hn::MulAdd(at(l.gx), hn::MaskedLoad(cells.inner, d, l.x + i + 1), a);
-  if (l.y_before != nullptr) a = hn::MulAdd(at(l.gy_before), at(l.y_before), a);
-  if (l.y_after != nullptr) a = hn::MulAdd(at(l.gy_after), at(l.y_after), a);
-  if (l.z_before != nullptr) a = hn::MulAdd(at(l.gz_before), at(l.z_before), a);
-  if (l.z_after != nullptr) a = hn::MulAdd(at(l.gz_after), at(l.z_after), a);
-  return a;
+/// The lanes of those cells; whatever lies in the others, where it can be read.
+HWY_INLINE V load(const double* at, M cells, const EdgeCells&) {
+  return hn::MaskedLoad(cells, D(), at);
+}
+HWY_INLINE V load(const double* at, M, const Cells&) { return hn::LoadU(D(), at); }
+
+HWY_INLINE void store(V a, double* at, const EdgeCells& cells) {
+  hn::BlendedStore(a, cells.all, D(), at);
+}
+HWY_INLINE void store(V a, double* at, const Cells& cells) {
+  hn::StoreU(hn::IfThenElse(cells.all, a, hn::LoadU(D(), at)), D(), at);
 }
 
-HWY_INLINE void prefetch(const FieldLine& l, int i) {
-  hwy::Prefetch(l.b + i + kAhead);
-  if (l.z_after != nullptr) hwy::Prefetch(l.z_after + i + kAhead);
-}
-
-void relax(const FieldLine& line, double* x, int first, int nx) {
-  const FieldLine l = line;  // not to be read again after every store
-  const D d;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  const V one = hn::Set(d, 1.0);
+/// f(i, cells) for every register of a line.
+template <class F>
+HWY_INLINE void for_registers(int first, int nx, const F& f) {
+  const auto step = static_cast<int>(hn::Lanes(D()));
   M colour = every_other(0, first);
   for (int i = 0; i < nx; i += step) {
-    prefetch(l, i);
     if (step == 1) colour = every_other(i, first);
-    const Cells cells(colour, i, nx);
-    const V diagonal = hn::MaskedLoad(cells.all, d, l.diagonal + i);
-    const V change = hn::Div(residual_at(l, i, cells), hn::IfThenElse(cells.all, diagonal, one));
-    const V before = l.x == nullptr ? hn::Zero(d) : hn::MaskedLoad(cells.all, d, l.x + i);
-    hn::BlendedStore(hn::Add(before, change), cells.all, d, x + i);
+    if (i > 0 && i + step < nx)
+      f(i, Cells{colour, colour, colour});
+    else
+      f(i, EdgeCells(colour, i, nx));
   }
 }
 
-template <class T>
-double residual(const FieldLine& line, double scale, T* r, int first, int nx) {
-  const FieldLine l = line;  // not to be read again after every store
+/// What joins every other cell of a line to its six neighbours; zero in the other cells.
+struct Joins {
+  V x_before, x_after, y_before, y_after, z_before, z_after;
+};
+
+HWY_INLINE Joins joins_at(const LineCoefficients& k, int i, const Cells& cells) {
   const D d;
-  const auto step = static_cast<int>(hn::Lanes(d));
-  const V factor = hn::Set(d, scale);
-  V sum = hn::Zero(d);
-  M colour = every_other(0, first);
-  for (int i = 0; i < nx; i += step) {
-    prefetch(l, i);
-    if (step == 1) colour = every_other(i, first);
-    const V a = residual_at(l, i, Cells(colour, i, nx));
-    sum = hn::MulAdd(a, a, sum);
-    if (r != nullptr) store_every_other(hn::Mul(a, factor), r + i / 2, (first + i) % 2);
+  return {hn::MaskedLoad(cells.later, d, k.gx + i - 1),
+          hn::MaskedLoad(cells.inner, d, k.gx + i),
+          hn::MaskedLoad(cells.all, d, k.gy_before + i),
+          hn::MaskedLoad(cells.all, d, k.gy_after + i),
+          hn::MaskedLoad(cells.all, d, k.gz_before + i),
+          hn::MaskedLoad(cells.all, d, k.gz_after + i)};
+}
+
+/// sum + sum g u over the neighbours, which have the other colour: nothing else counts.
+template <class C>
+HWY_INLINE V add_neighbours(V sum, const Joins& g, const NearLines& u, int i, const C& cells) {
+  sum = hn::MulAdd(g.x_before, load(u.at + i - 1, cells.later, cells), sum);
+  sum = hn::MulAdd(g.x_after, load(u.at + i + 1, cells.inner, cells), sum);
+  sum = hn::MulAdd(g.y_before, load(u.y_before + i, cells.all, cells), sum);
+  sum = hn::MulAdd(g.y_after, load(u.y_after + i, cells.all, cells), sum);
+  sum = hn::MulAdd(g.z_before, load(u.z_before + i, cells.all, cells), sum);
+  return hn::MulAdd(g.z_after, load(u.z_after + i, cells.all, cells), sum);
+}
+
+template <int N>
+HWY_INLINE void relax_lines(
+    const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx) {
+  for_registers(first, nx, [&](int i, const auto& cells) HWY_ATTR {
+    const Joins g = joins_at(k, i, cells);
+    const V one = hn::Set(D(), 1.0);
+    const V diagonal = hn::MaskedLoad(cells.all, D(), k.diagonal + i);
+    const V inverse = hn::Div(one, hn::IfThenElse(cells.all, diagonal, one));
+    for (int n = 0; n < N; ++n) {
+      hwy::Prefetch(f.b[n].at + i + kAhead);
+      hwy::Prefetch(f.x[n].z_after + i + kAhead);
+      const V sum = add_neighbours(load(f.b[n].at + i, cells.all, cells), g, f.x[n], i, cells);
+      store(hn::Mul(sum, inverse), to[n] + i, cells);
+    }
+  });
+}
+
+void relax(const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx) {
+  if (f.count == kFieldsAtOnce) {
+    relax_lines<kFieldsAtOnce>(k, f, to, first, nx);
+    return;
   }
-  return hn::GetLane(hn::SumOfLanes(d, sum));
+  for (int n = 0; n < f.count; ++n) relax_lines<1>(k, {{f.b[n]}, {f.x[n]}, 1}, to + n, first, nx);
+}
+
+/// r = scale a and sums += a^2, where a = at(n, i, cells).
+template <class T>
+struct Kept {
+  const double* scale;
+  T* const* r;
+  double* sums;
+};
+
+template <int N, class T, class F>
+HWY_INLINE void keep_lines(const Kept<T>& kept, int first, int nx, const F& values) {
+  V sum[N];
+  for (int n = 0; n < N; ++n) sum[n] = hn::Zero(D());
+  for_registers(first, nx, [&](int i, const auto& cells) HWY_ATTR {
+    V a[N];
+    values(i, cells, a);
+    for (int n = 0; n < N; ++n) {
+      a[n] = hn::IfThenElseZero(cells.all, a[n]);
+      sum[n] = hn::MulAdd(a[n], a[n], sum[n]);
+      if (kept.r[n] != nullptr)
+        store_every_other(
+            hn::Mul(a[n], hn::Set(D(), kept.scale[n])), kept.r[n] + i / 2, (first + i) % 2);
+    }
+  });
+  for (int n = 0; n < N; ++n) kept.sums[n] += hn::GetLane(hn::SumOfLanes(D(), sum[n]));
+}
+
+template <int N, class T>
+void residual_lines(
+    const LineCoefficients& k, const FieldLines& f, const Kept<T>& kept, int first, int nx) {
+  keep_lines<N>(kept, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+    const Joins g = joins_at(k, i, cells);
+    const V diagonal = hn::MaskedLoad(cells.all, D(), k.diagonal + i);
+    for (int n = 0; n < N; ++n) {
+      hwy::Prefetch(f.b[n].at + i + kAhead);
+      hwy::Prefetch(f.x[n].z_after + i + kAhead);
+      a[n] = load(f.b[n].at + i, cells.all, cells);
+      a[n] = hn::NegMulAdd(diagonal, load(f.x[n].at + i, cells.all, cells), a[n]);
+      a[n] = add_neighbours(a[n], g, f.x[n], i, cells);
+    }
+  });
+}
+
+HWY_INLINE V load_inverse(const double* at, M cells) { return hn::MaskedLoad(cells, D(), at); }
+HWY_INLINE V load_inverse(const float* at, M cells) {
+  const hn::Rebind<float, D> single;
+  const auto kept = hn::DemoteTo(single, hn::IfThenElseZero(cells, hn::Set(D(), 1.0)));
+  return hn::PromoteTo(D(), hn::MaskedLoad(hn::Ne(kept, hn::Zero(single)), single, at));
+}
+
+template <int N, class T>
+void dark_residual_lines(const LineCoefficients& k,
+                         const InverseLines<T>& inverse,
+                         const FieldLines& f,
+                         const Kept<T>& kept,
+                         int first,
+                         int nx) {
+  keep_lines<N>(kept, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+    const V unit = hn::Set(D(), inverse.unit);
+    const auto over = [&](V g, const T* at, M there) HWY_ATTR {
+      return hn::Mul(hn::Mul(g, unit), load_inverse(at + i, there));
+    };
+    Joins g = joins_at(k, i, cells);
+    g = {over(g.x_before, inverse.at - 1, cells.later),
+         over(g.x_after, inverse.at + 1, cells.inner),
+         over(g.y_before, inverse.y_before, cells.all),
+         over(g.y_after, inverse.y_after, cells.all),
+         over(g.z_before, inverse.z_before, cells.all),
+         over(g.z_after, inverse.z_after, cells.all)};
+    for (int n = 0; n < N; ++n) {
+      hwy::Prefetch(f.b[n].z_after + i + kAhead);
+      a[n] = add_neighbours(load(f.b[n].at + i, cells.all, cells), g, f.b[n], i, cells);
+    }
+  });
 }
 
 template <class T>
-void add_from(double* x, const T* c, double factor, int first, int nx) {
-  for (int i = first; i < nx; i += 2) x[i] += factor * static_cast<double>(c[i / 2]);
+void residual(const LineCoefficients& k,
+              const FieldLines& f,
+              const double* scale,
+              T* const* r,
+              double* sums,
+              int first,
+              int nx) {
+  if (f.count == kFieldsAtOnce) {
+    residual_lines<kFieldsAtOnce>(k, f, Kept<T>{scale, r, sums}, first, nx);
+    return;
+  }
+  for (int n = 0; n < f.count; ++n)
+    residual_lines<1>(k, {{f.b[n]}, {f.x[n]}, 1}, Kept<T>{scale + n, r + n, sums + n}, first, nx);
 }
 
-void add(double* x, const double* c, double factor, int first, int nx) {
-  add_from(x, c, factor, first, nx);
+template <class T>
+void dark_residual(const LineCoefficients& k,
+                   const InverseLines<T>& inverse,
+                   const FieldLines& f,
+                   const double* scale,
+                   T* const* r,
+                   double* sums,
+                   int first,
+                   int nx) {
+  if (f.count == kFieldsAtOnce) {
+    dark_residual_lines<kFieldsAtOnce>(k, inverse, f, Kept<T>{scale, r, sums}, first, nx);
+    return;
+  }
+  for (int n = 0; n < f.count; ++n)
+    dark_residual_lines<1>(
+        k, inverse, {{f.b[n]}, {f.x[n]}, 1}, Kept<T>{scale + n, r + n, sums + n}, first, nx);
 }
 
-void add(double* x, const float* c, double factor, int first, int nx) {
+template <class T>
+void add_from(double* x, const T* c, const T* more, double factor, int first, int nx) {
+  for (int i = first; i < nx; i += 2) {
+    double sum = c != nullptr ? static_cast<double>(c[i / 2]) : 0.0;
+    if (more != nullptr) sum += static_cast<double>(more[i / 2]);
+    x[i] += factor * sum;
+  }
+}
+
+void add(double* x, const double* c, const double* more, double factor, int first, int nx) {
+  add_from(x, c, more, factor, first, nx);
+}
+
+void add(double* x, const float* c, const float* more, double factor, int first, int nx) {
 #if HWY_TARGET == HWY_SCALAR
-  add_from(x, c, factor, first, nx);
+  add_from(x, c, more, factor, first, nx);
 #else
   const D d;
   const auto step = static_cast<int>(hn::Lanes(d));
@@ -152,36 +290,27 @@ void add(double* x, const float* c, double factor, int first, int nx) {
   int i = 0;
   for (; i + step <= nx; i += step) {
     hwy::Prefetch(x + i + kAhead);
-    const V before = hn::LoadU(d, x + i);
-    hn::StoreU(hn::MulAdd(f, load_every_other(c + i / 2, first), before), d, x + i);
+    V sum = c != nullptr ? load_every_other(c + i / 2, first) : hn::Zero(d);
+    if (more != nullptr) sum = hn::Add(sum, load_every_other(more + i / 2, first));
+    hn::StoreU(hn::MulAdd(f, sum, hn::LoadU(d, x + i)), d, x + i);
   }
-  add_from(x + i, c + i / 2, factor, first, nx - i);
+  add_from(x + i,
+           c != nullptr ? c + i / 2 : nullptr,
+           more != nullptr ? more + i / 2 : nullptr,
+           factor,
+           first,
+           nx - i);
 #endif
 }
 
 template <class T>
-void to_fields_from(const T* d,
-                    const T* p,
-                    const T* step,
-                    T* fields,
-                    std::size_t stride,
-                    int width,
-                    int first,
-                    int nx) {
+void to_fields_from(const T* lanes, T* fields, std::size_t stride, int width, int first, int nx) {
   for (std::ptrdiff_t i = first; i < nx; ++i)
-    for (std::ptrdiff_t m = 0; m < width; ++m)
-      fields[m * stride + i] =
-          (d != nullptr ? d[i * width + m] : T{0}) + step[m] * p[i * width + m];
+    for (std::ptrdiff_t m = 0; m < width; ++m) fields[m * stride + i] = lanes[i * width + m];
 }
 
-void to_fields(const double* d,
-               const double* p,
-               const double* step,
-               double* fields,
-               std::size_t stride,
-               int width,
-               int nx) {
-  to_fields_from(d, p, step, fields, stride, width, 0, nx);
+void to_fields(const double* lanes, double* fields, std::size_t stride, int width, int nx) {
+  to_fields_from(lanes, fields, stride, width, 0, nx);
 }
 
 template <class T>
@@ -195,14 +324,8 @@ void to_lanes(const double* fields, std::size_t stride, double* lanes, int width
 }
 
 #if HWY_TARGET == HWY_SCALAR
-void to_fields(const float* d,
-               const float* p,
-               const float* step,
-               float* fields,
-               std::size_t stride,
-               int width,
-               int nx) {
-  to_fields_from(d, p, step, fields, stride, width, 0, nx);
+void to_fields(const float* lanes, float* fields, std::size_t stride, int width, int nx) {
+  to_fields_from(lanes, fields, stride, width, 0, nx);
 }
 
 void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, int nx) {
@@ -226,29 +349,18 @@ HWY_INLINE Square transposed(const Square& s) {
            hn::ConcatUpperUpper(f, high23, high01)}};
 }
 
-void to_fields(const float* d,
-               const float* p,
-               const float* step,
-               float* fields,
-               std::size_t stride,
-               int width,
-               int nx) {
+void to_fields(const float* lanes, float* fields, std::size_t stride, int width, int nx) {
   const Four f;
   const int whole = width % 4 == 0 ? nx / 4 * 4 : 0;
   for (std::ptrdiff_t i = 0; i < whole; i += 4)
     for (std::ptrdiff_t m = 0; m < width; m += 4) {
-      const auto length = hn::LoadU(f, step + m);
       Square s;
-      for (std::ptrdiff_t n = 0; n < 4; ++n) {
-        const std::ptrdiff_t at = (i + n) * width + m;
-        const auto sum = d != nullptr ? hn::LoadU(f, d + at) : hn::Zero(f);
-        s.row[n] = hn::MulAdd(length, hn::LoadU(f, p + at), sum);
-      }
+      for (std::ptrdiff_t n = 0; n < 4; ++n) s.row[n] = hn::LoadU(f, lanes + (i + n) * width + m);
       s = transposed(s);
       for (std::ptrdiff_t n = 0; n < 4; ++n)
         hn::StoreU(s.row[n], f, fields + (m + n) * static_cast<std::ptrdiff_t>(stride) + i);
     }
-  to_fields_from(d, p, step, fields, stride, width, whole, nx);
+  to_fields_from(lanes, fields, stride, width, whole, nx);
 }
 
 void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, int nx) {
@@ -266,9 +378,11 @@ void to_lanes(const float* fields, std::size_t stride, float* lanes, int width, 
 }
 #endif
 
-FieldKernels<float> single_kernels() { return {relax, residual<float>, add, to_fields, to_lanes}; }
+FieldKernels<float> single_kernels() {
+  return {relax, residual<float>, dark_residual<float>, add, to_fields, to_lanes};
+}
 FieldKernels<double> double_kernels() {
-  return {relax, residual<double>, add, to_fields, to_lanes};
+  return {relax, residual<double>, dark_residual<double>, add, to_fields, to_lanes};
 }
 
 }  // namespace opaline::reconstruct::host::HWY_NAMESPACE

@@ -24,7 +24,7 @@ Result<void> validate(const HostOptions& options);
 /// tolerances down to about 1e-12 are reached in each.
 ///
 /// The result does not depend on the number of threads, bit for bit. Working memory is kept from
-/// one solve to the next: about 18 bytes a cell and right-hand side of a group of 16 in single precision.
+/// one solve to the next: about 20 bytes a cell and right-hand side of a group of 16 in single precision.
 ///
 /// `options` must be valid.
 std::unique_ptr<diffusion::FluenceSolver> make_host_solver(const HostOptions& options);

@@ -79,10 +79,6 @@ struct Lanes {
   HWY_INLINE void add(const Lanes& a, const Lanes& b) {
     for (int n = 0; n < kCount; ++n) v[n] = hn::MulAdd(a.v[n], b.v[n], v[n]);
   }
-  /// -= a * b, lane by lane.
-  HWY_INLINE void subtract(const Lanes& a, const Lanes& b) {
-    for (int n = 0; n < kCount; ++n) v[n] = hn::NegMulAdd(a.v[n], b.v[n], v[n]);
-  }
   /// factor * this, added to what lies at `at`.
   HWY_INLINE void add_scaled_to(T* at, T factor) const {
     const V f = hn::Set(D(), factor);
@@ -269,38 +265,71 @@ struct Kernels {
     total.add_to(sum);
   }
 
-  static void combine(T* out, const S* z, const T* p, const T* beta, int nx) {
-    const L b = L::load(beta);
+  template <bool kRestarts, bool kBegins, bool kKeeps>
+  static void step_as(const StepFactors<T>& f,
+                      const S* z,
+                      const T* s_before,
+                      const T* d_before,
+                      T* s,
+                      T* d,
+                      int nx) {
+    const L along_z = L::load(f.z);
+    const L along_before = L::load(f.before);
+    const L growth = L::load(f.growth);
+    const L shrink = L::load(f.shrink);
     for (std::ptrdiff_t i = 0; i < nx; ++i) {
       L a = L::load(z + i * W);
-      a.add(b, L::load(p + i * W));
-      a.store(out + i * W);
+      a.scale(along_z);
+      if constexpr (!kRestarts) a.add(along_before, L::load(s_before + i * W));
+      L moved;
+      if constexpr (kBegins) {
+        moved = a;
+        moved.scale(shrink);
+      } else {
+        const L before = L::load(d_before + i * W);
+        moved = before;
+        moved.add(shrink, a);
+        a = moved;
+        a.add(T{-1}, before);
+        a.scale(growth);
+      }
+      if constexpr (kKeeps) moved.store(d + i * W);
+      a.store(s + i * W);
     }
   }
 
-  static void direction(
-      Direction mode, T* p, const S* z, T* d, const T* alpha, const T* beta, int nx) {
-    const L step = L::load(alpha);
-    if (mode == Direction::kRestart)
-      for (std::ptrdiff_t i = 0; i < nx; ++i) L::load(z + i * W).store(p + i * W);
-    if (mode == Direction::kKeep) combine(p, z, p, beta, nx);
-    if (mode == Direction::kStore || mode == Direction::kAdd) {
-      const L b = L::load(beta);
-      for (std::ptrdiff_t i = 0; i < nx; ++i) {
-        const L before = L::load(p + i * W);
-        L sum = mode == Direction::kAdd ? L::load(d + i * W) : L::zero();
-        sum.add(step, before);
-        sum.store(d + i * W);
-        L a = L::load(z + i * W);
-        a.add(b, before);
-        a.store(p + i * W);
-      }
-    }
+  template <bool kRestarts, bool kBegins>
+  static void step_to(const StepFactors<T>& f,
+                      const S* z,
+                      const T* s_before,
+                      const T* d_before,
+                      T* s,
+                      T* d,
+                      int nx) {
+    if (d != nullptr)
+      step_as<kRestarts, kBegins, true>(f, z, s_before, d_before, s, d, nx);
+    else
+      step_as<kRestarts, kBegins, false>(f, z, s_before, d_before, s, d, nx);
+  }
+
+  static void step(const StepFactors<T>& f,
+                   const S* z,
+                   const T* s_before,
+                   const T* d_before,
+                   T* s,
+                   T* d,
+                   int nx) {
+    if (s_before == nullptr)
+      d_before == nullptr ? step_to<true, true>(f, z, s_before, d_before, s, d, nx)
+                          : step_to<true, false>(f, z, s_before, d_before, s, d, nx);
+    else
+      d_before == nullptr ? step_to<false, true>(f, z, s_before, d_before, s, d, nx)
+                          : step_to<false, false>(f, z, s_before, d_before, s, d, nx);
   }
 
   static void relax(
-      T* t, const T* sink, const T* inverse, const PackedStencil<T>& p, int first, int nx) {
-    const PackedStencil<T> s = p;  // not to be read again after every store
+      T* t, const T* sink, const T* inverse, const PackedStencil<T>& rows, int first, int nx) {
+    const PackedStencil<T> s = rows;  // not to be read again after every store
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
       L whole = L::zero();
       for_neighbours(s, i, W, [&](T g, const T* at) { whole.add(g, L::load(at)); });
@@ -319,20 +348,18 @@ struct Kernels {
   }
 
   static void update(T* r,
-                     const T* p,
+                     const T* steps,
                      const T* sink,
                      const PackedStencil<T>& rows,
-                     const T* alpha,
                      const T* factor,
                      double* sum,
                      int first,
                      int nx) {
     const PackedStencil<T> s = rows;  // not to be read again after every store
-    const L step = L::load(alpha);
     const L f = L::load(factor);
     L total = L::zero();
     for (std::ptrdiff_t i = first; i < nx; i += 2) {
-      const L u = L::load(p + i / 2 * W);
+      const L u = L::load(steps + i / 2 * W);
       L q = u;
       q.scale(sink[i]);
       for_neighbours(s, i, 2 * W, [&](T g, const T* at) {
@@ -342,7 +369,7 @@ struct Kernels {
         q.add(g, off);
       });
       L a = L::load(r + i / 2 * W);
-      a.subtract(step, q);
+      a.add(T{-1}, q);
       a.scale(f);
       a.store(r + i / 2 * W);
       total.add(a, a);
@@ -351,8 +378,7 @@ struct Kernels {
   }
 
   static RowKernels<T, S> table() {
-    return {
-        scale, prolong, sweep, restrict_row, copy, emit, energy, direction, combine, relax, update};
+    return {scale, prolong, sweep, restrict_row, copy, emit, energy, step, relax, update};
   }
 };
 

@@ -69,9 +69,14 @@ struct CoarseRows {
   T* outer;
 };
 
-/// kRestart: p = z. kKeep: p = z + beta p. kStore: the same after d = alpha p. kAdd: after d +=
-/// alpha p.
-enum class Direction : std::uint8_t { kRestart, kKeep, kStore, kAdd };
+/// The factors of a step, one a right-hand side.
+template <class T>
+struct StepFactors {
+  const T* z;       ///< alpha
+  const T* before;  ///< alpha beta / the alpha before
+  const T* growth;  ///< a power of two: d is in units of s / growth
+  const T* shrink;  ///< 1 / growth
+};
 
 template <class T, class S>
 struct RowKernels {
@@ -105,20 +110,25 @@ struct RowKernels {
   /// sum += c z . z + sum g (z - z_near)^2 over every other cell, z = (sum g z_near) / D; s.u is z_near.
   void (*energy)(
       const T* sink, const T* inverse, const Stencil<T>& s, double* sum, int first, int nx);
-  void (*direction)(Direction mode, T* p, const S* z, T* d, const T* alpha, const T* beta, int nx);
-  /// out = z + beta p.
-  void (*combine)(T* out, const S* z, const T* p, const T* beta, int nx);
-  /// In every other cell t = (sum g p) / D, and what t lacks by rounding: t[2 m] and t[2 m + 1] are
-  /// t and t' = (sum g (p - t) - c t) / D, so that K (p, t + t') vanishes there. c = D - sum g.
+  /// s = alpha z + alpha beta / (alpha before) s_before, then d = d_before + s as it is rounded, and s = d - d_before,
+  /// which is what d really moved by. A null s_before or d_before is zero; a null d is not kept.
+  void (*step)(const StepFactors<T>& factors,
+               const S* z,
+               const T* s_before,
+               const T* d_before,
+               T* s,
+               T* d,
+               int nx);
+  /// In every other cell t = (sum g s) / D, and what t lacks by rounding: t[2 m] and t[2 m + 1] are
+  /// t and t' = (sum g (s - t) - c t) / D, so that K (s, t + t') vanishes there. c = D - sum g.
   void (*relax)(
-      T* t, const T* sink, const T* inverse, const PackedStencil<T>& p, int first, int nx);
-  /// r = factor (r - alpha q) in every other cell, q = c p + sum g (p - t - t') with t as relax leaves
-  /// it; r and p packed; sum += r . r, one sum a right-hand side.
+      T* t, const T* sink, const T* inverse, const PackedStencil<T>& s, int first, int nx);
+  /// r = factor (r - q) in every other cell, q = c s + sum g (s - t - t') with t as relax leaves
+  /// it; r and s packed; sum += r . r, one sum a right-hand side.
   void (*update)(T* r,
-                 const T* p,
+                 const T* s,
                  const T* sink,
                  const PackedStencil<T>& t,
-                 const T* alpha,
                  const T* factor,
                  double* sum,
                  int first,

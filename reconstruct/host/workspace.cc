@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kNumbersPerThread = 16384;  // about 10 us of sweeping: worth waking somebody
 // Of a tile; five such planes are at work. Narrower tiles compute more around themselves than they save.
 constexpr std::size_t kPlaneBytes = 384 << 10;
-constexpr std::size_t kBytesAtWork = 512 << 10;  // four planes of p, three of red cells
+constexpr std::size_t kBytesAtWork = 512 << 10;  // four planes of s, three of red cells
 constexpr int kFewestRows = 8;
 constexpr std::size_t kFieldNumbers = 64 << 10;  // of a thread, in the cache
 constexpr int kHalo = 4;                         // cells, even: one more than half-sweeps reach
@@ -81,8 +81,9 @@ Workspace<T, S>::Workspace(const HostGrid<T>& grid, int lanes, int threads)
   }
   const HostLevel<T>& finest = grid.levels.front();
   const int half = half_line(finest.nx);
-  for (HostField<T>* field : {&p, &d}) *field = HostField<T>(half, finest.ni, finest.no, lanes);
-  const std::size_t at_work = 10 * p.row_size() * sizeof(T);
+  for (HostField<T>* field : {&s, &d, &aside})
+    *field = HostField<T>(half, finest.ni, finest.no, lanes);
+  const std::size_t at_work = 10 * s.row_size() * sizeof(T);
   rows_at_work_ = std::max(kFewestRows, static_cast<int>(kBytesAtWork / at_work) / 2 * 2);
   for (int thread = 0; thread < parts_.front(); ++thread) {
     halo.emplace_back(half, finest.ni, 4, lanes);
@@ -91,7 +92,7 @@ Workspace<T, S>::Workspace(const HostGrid<T>& grid, int lanes, int threads)
   }
   const std::size_t line = padded(half) * lanes;
   fields.assign(parts_.front(),
-                std::vector<T>(line * std::max<std::size_t>(3, kFieldNumbers / line), T{0}));
+                std::vector<T>(2 * line * std::max<std::size_t>(3, kFieldNumbers / line), T{0}));
   const std::size_t row = (static_cast<std::size_t>(finest.nx) + 5) * lanes;
   zeros.assign(row, T{0});
   stored_zeros.assign(row, S{});

@@ -77,17 +77,17 @@ struct Workspace {
 
   /// How many threads share a level: fewer where there is little to do.
   int parts(int level) const { return parts_[level]; }
-  /// Lines of p that are updated while they are in the cache.
+  /// Lines of s that are updated while they are in the cache.
   int rows_at_work() const { return rows_at_work_; }
 
   int width;                                     ///< 1, 4, 8 or 16
   std::vector<HostField<T>> r;                   ///< one a level
   std::vector<HostField<S>> z;                   ///< one a level
-  HostField<T> p, d;                             ///< level 0
+  HostField<T> s, d, aside;                      ///< level 0; d is begun anew where aside is taken
   std::vector<std::vector<Tile>> tiles;          ///< [level]
   std::vector<std::vector<Scratch<T>>> scratch;  ///< [level][thread]
-  std::vector<HostField<T>> halo;                ///< [thread]: p beyond the slab, four planes
-  std::vector<HostField<T>> relaxed;   ///< [thread]: red cells while p is at work, kRelaxedPlanes
+  std::vector<HostField<T>> halo;                ///< [thread]: s beyond the slab, four planes
+  std::vector<HostField<T>> relaxed;   ///< [thread]: red cells while s is at work, kRelaxedPlanes
   std::vector<std::vector<T>> fields;  ///< [thread]: some lines, field by field
   std::vector<T> zeros;                ///< a row outside the grid, after two cells
   std::vector<S> stored_zeros;         ///< the same of z

@@ -100,6 +100,35 @@ TEST(HostSolver, SolvesInTilesAsItDoesInOnePiece) {
   }
 }
 
+// Light through one face of a block that hardly absorbs: so much fluence that, rounded to single precision, it is far
+// from the tolerance. The solver keeps its corrections in single precision and must not need more iterations for it.
+TEST(HostSolver, LosesNoIterationsToSinglePrecision) {
+  const Block block{40, 40, 40, 0.02, 0.02, 0.02};
+  Medium medium = random_medium(block, 30.0, 4);
+  for (double& absorption : medium.absorption) absorption *= 1e-4;
+  FieldBatch b(block.cell_count(), 4);
+  for (int m = 0; m < b.count; ++m)
+    for (int i = 0; i < 1600; ++i) b.field(m)[i] = i / 400 == m ? 1.0 : 0.0;
+  for (const double tolerance : {1e-4, 1e-6, 1e-7, 1e-9, 1e-12}) {
+    std::array<int, kPrecisions.size()> iterations{};
+    for (std::size_t n = 0; n < kPrecisions.size(); ++n) {
+      const auto host = make_host_solver({.threads = 2, .precision = kPrecisions[n]});
+      ASSERT_TRUE(host->prepare(medium));
+      FieldBatch phi(b.cells, b.count);
+      const auto solved = host->solve(b, phi, {tolerance, 100}, {});
+      ASSERT_TRUE(solved);
+      EXPECT_LE(diffusion::testing::residual_of(medium, b, phi), tolerance);
+      iterations[n] = solved->iterations;
+      for (double& value : phi.values) value = static_cast<double>(static_cast<float>(value));
+      if (tolerance <= 1e-6) {
+        EXPECT_GT(diffusion::testing::residual_of(medium, b, phi), 4 * tolerance);
+      }
+    }
+    EXPECT_LE(iterations[0], iterations[2] + 1) << tolerance;
+    EXPECT_LE(iterations[1], iterations[2] + 1) << tolerance;
+  }
+}
+
 TEST(HostSolver, ServesOneMediumAfterAnother) {
   const auto host = make_host_solver({.threads = 2});
   for (const Block& block : {Block{20, 10, 30, 0.5, 0.5, 0.5}, Block{10, 20, 30, 0.5, 0.5, 0.5}})
