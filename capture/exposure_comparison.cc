@@ -187,7 +187,7 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
     int x,
     int y,
     int channel,
-    double tile_rate) const {
+    const Rates& tile) const {
   const int width = footprint.width();
   const auto place = [&](int u, int v) {
     return 3 * (static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u)) +
@@ -217,29 +217,27 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
 
   const Electrons& brief = electrons_[shorter.light->at(x, y, channel)];
   const auto [brief_black, brief_blacks] = black_of(shorter, place(x, y), electrons_);
-  const auto [black, blacks] = black_of(longer, place(x, y), electrons_);
+  const double blacks = black_of(longer, place(x, y), electrons_).frames;
   const double around = (light[0][0] + light[0][1] + light[0][2] + light[1][0] + light[1][2] +
                          light[2][0] + light[2][1] + light[2][2]) /
                         8.0 / longer.light_seconds;
-  // Of a rate: noise of a frame and of its black, around what the neighbours say.
-  const auto variance_of =
-      [&](const ExposurePair& pair, double rate, const Electrons& dark, double frames) {
-        const double t = pair.light_seconds;
-        const double scale = t / pair.black_seconds;
-        const double leak = std::max(dark.signal, 0.0);
-        return (noise_variance(camera_, rate * t + leak * scale, own.per_code) +
-                scale * scale * noise_variance(camera_, leak, dark.per_code) / frames) /
-               (t * t);
-      };
-  if (tile_rate <
-      kAboveNoise * std::sqrt(variance_of(shorter, tile_rate, brief_black, brief_blacks)))
+  // Of a rate: noise of a frame and of its black. By the neighbours' light and the tile's leak: with its own a weight would follow its noise.
+  const auto variance_of = [&](const ExposurePair& pair, double rate, double frames) {
+    const double t = pair.light_seconds;
+    const double scale = t / pair.black_seconds;
+    return (noise_variance(camera_, (rate + tile.leak) * t, own.per_code) +
+            scale * scale * noise_variance(camera_, tile.leak * pair.black_seconds, own.per_code) /
+                frames) /
+           (t * t);
+  };
+  if (tile.light < kAboveNoise * std::sqrt(variance_of(shorter, tile.light, brief_blacks)))
     return std::nullopt;
-  const double variance = variance_of(shorter, around, brief_black, brief_blacks) +
-                          variance_of(longer, around, black, blacks);
+  const double variance =
+      variance_of(shorter, around, brief_blacks) + variance_of(longer, around, blacks);
   const double brief_rate =
       (brief.signal - brief_black.signal * shorter.light_seconds / shorter.black_seconds) /
       shorter.light_seconds;
-  const double most = kWild * std::sqrt(variance) + std::max(around, tile_rate);
+  const double most = kWild * std::sqrt(variance) + std::max(around, tile.light);
   Sample sample;
   sample.difference = std::clamp(brief_rate - light[1][1] / longer.light_seconds, -most, most);
   sample.around = around;
@@ -249,18 +247,18 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
   sample.slope_x = eighth * (row(0) + 2.0 * row(1) + row(2));
   sample.slope_y = eighth * (column(0) + 2.0 * column(1) + column(2));
   sample.weight = 1.0 / variance;
-  sample.level = std::max(around, kDarkest * tile_rate) * longer.light_seconds /
+  sample.level = std::max(around, kDarkest * tile.light) * longer.light_seconds /
                  camera_.full_scale_electrons();
-  sample.signal = tile_rate * shorter.light_seconds / camera_.full_scale_electrons();
+  sample.signal = tile.light * shorter.light_seconds / camera_.full_scale_electrons();
   return sample;
 }
 
 // Clipped pixels count as what they clip at.
-std::vector<std::array<double, 3>> ExposureComparer::tile_rates(
+std::vector<std::array<ExposureComparer::Rates, 3>> ExposureComparer::tile_rates(
     const ExposurePair& longer, const Image<std::uint8_t>& footprint) const {
   const int across = (footprint.width() + kTile - 1) / kTile;
   const int down = (footprint.height() + kTile - 1) / kTile;
-  std::vector<std::array<double, 3>> rates(static_cast<std::size_t>(across) * down);
+  std::vector<std::array<Rates, 3>> rates(static_cast<std::size_t>(across) * down);
   std::vector<double> pixels(rates.size());
   std::size_t place = 0;
   for (int y = 0; y < footprint.height(); ++y) {
@@ -273,7 +271,9 @@ std::vector<std::array<double, 3>> ExposureComparer::tile_rates(
         const double light = electrons_[longer.light->samples()[sample]].signal;
         const double black = black_of(longer, sample, electrons_).electrons.signal;
         const double net = light - black * longer.light_seconds / longer.black_seconds;
-        rates[tile][c] += (net / longer.light_seconds - rates[tile][c]) / pixels[tile];
+        Rates& mean = rates[tile][c];
+        mean.light += (net / longer.light_seconds - mean.light) / pixels[tile];
+        mean.leak += (std::max(black, 0.0) / longer.black_seconds - mean.leak) / pixels[tile];
       }
     }
   }
@@ -290,7 +290,7 @@ ExposureComparer::Sums ExposureComparer::sums_of(const ExposurePair& shorter,
       if (footprint.at(x, y) == 0) continue;
       const auto tile = static_cast<std::size_t>(y / kTile * sums.across + x / kTile);
       for (int c = 0; c < 3; ++c) {
-        const double rate = rates[tile][static_cast<std::size_t>(c)];
+        const Rates& rate = rates[tile][static_cast<std::size_t>(c)];
         if (const auto s = sample_at(shorter, longer, footprint, x, y, c, rate))
           sums.add(*s, std::log(s->level), tile, static_cast<std::size_t>(c));
       }

@@ -65,6 +65,10 @@ class ExposureComparer {
     double level = 0.0;   ///< b over full scale, > 0
     double signal = 0.0;  ///< of the shorter exposure around, over full scale
   };
+  struct Rates {  ///< mean of a tile, electrons a second
+    double light = 0.0;
+    double leak = 0.0;
+  };
   struct Sums;
   struct Fit;
   std::optional<Sample> sample_at(const ExposurePair& shorter,
@@ -73,9 +77,9 @@ class ExposureComparer {
                                   int x,
                                   int y,
                                   int channel,
-                                  double tile_rate) const;
-  std::vector<std::array<double, 3>> tile_rates(const ExposurePair& longer,
-                                                const Image<std::uint8_t>& footprint) const;
+                                  const Rates& tile) const;
+  std::vector<std::array<Rates, 3>> tile_rates(const ExposurePair& longer,
+                                               const Image<std::uint8_t>& footprint) const;
   Sums sums_of(const ExposurePair& shorter,
                const ExposurePair& longer,
                const Image<std::uint8_t>& footprint) const;
