@@ -19,6 +19,7 @@ namespace {
 using Logs = Eigen::Vector2d;  // log sigma_s', log sigma_a
 
 constexpr int kMaxIterations = 20;
+constexpr int kScoutIterations = 4;
 constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
@@ -104,22 +105,19 @@ class Fit {
 
   Logs bounded(const Logs& logs) const { return logs.cwiseMax(lower_).cwiseMin(upper_); }
 
-  // The best of a table of optical thicknesses, absorption 0.0003 to 0.1 of scattering.
-  Result<Logs> start(std::initializer_list<double> depths) {
-    Logs best = Logs::Zero();
-    double least = std::numeric_limits<double>::infinity();
+  // Some steps from the best absorption, 0.0003 to 0.1 of scattering, of each optical thickness, and on from the best of
+  // those: a thin block that absorbs and a thick one that does not are two minima, and the table is too coarse to tell.
+  Result<HomogeneousFit> from_best_of(std::initializer_list<double> depths) {
+    HomogeneousFit best;
+    best.chi_squared = std::numeric_limits<double>::infinity();
     for (const double depth : depths) {
-      for (const double ratio : {3e-4, 3e-3, 3e-2, 1e-1}) {
-        const Logs logs = of_thickness(depth, ratio);
-        const auto r = residuals(logs);
-        if (!r) return r.error();
-        if (r->squaredNorm() < least) {
-          least = r->squaredNorm();
-          best = logs;
-        }
-      }
+      const auto start = best_absorption(depth);
+      if (!start) return start.error();
+      auto scout = from(*start, kScoutIterations);
+      if (!scout) return scout;
+      if (scout->chi_squared < best.chi_squared) best = *std::move(scout);
     }
-    return best;
+    return from({std::log(best.reduced_scattering), std::log(best.absorption)});
   }
 
   bool explains(const HomogeneousFit& fit) const {
@@ -135,12 +133,12 @@ class Fit {
     return sum;
   }
 
-  Result<HomogeneousFit> from(Logs logs) {
+  Result<HomogeneousFit> from(Logs logs, int most_iterations = kMaxIterations) {
     auto r = residuals(logs);
     if (!r) return r.error();
     State at{logs, *std::move(r)};
     int iteration = 0;
-    while (iteration < kMaxIterations) {
+    while (iteration < most_iterations) {
       ++iteration;
       const auto moved = step(at);
       if (!moved) return moved.error();
@@ -214,6 +212,20 @@ class Fit {
     return columns;
   }
 
+  Result<Logs> best_absorption(double depth) {
+    Logs best = Logs::Zero();
+    double least = std::numeric_limits<double>::infinity();
+    for (const double ratio : {3e-4, 3e-3, 3e-2, 1e-1}) {
+      const Logs logs = of_thickness(depth, ratio);
+      const auto r = residuals(logs);
+      if (!r) return r.error();
+      if (r->squaredNorm() >= least) continue;
+      least = r->squaredNorm();
+      best = logs;
+    }
+    return best;
+  }
+
   // A point of the way, and the slopes there where they are known.
   struct State {
     Logs logs;
@@ -270,13 +282,9 @@ class Fit {
 
 // Through a slab less light comes the more it scatters, through a film more: what no slab explains may be a film.
 Result<HomogeneousFit> sketched(Fit& sketch) {
-  const auto slab = sketch.start({2.0, 6.0, 18.0, 60.0});
-  if (!slab) return slab.error();
-  auto fit = sketch.from(*slab);
+  auto fit = sketch.from_best_of({2.0, 6.0, 18.0, 60.0});
   if (!fit || sketch.explains(*fit)) return fit;
-  const auto film = sketch.start({0.02, 0.1, 0.5});
-  if (!film) return film.error();
-  auto thinner = sketch.from(*film);
+  auto thinner = sketch.from_best_of({0.02, 0.1, 0.5});
   if (!thinner || thinner->chi_squared < fit->chi_squared) return thinner;
   fit->solves = thinner->solves;  // counted by the sketch
   return fit;
