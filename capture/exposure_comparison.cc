@@ -14,7 +14,7 @@ constexpr int kTile = 16;
 constexpr double kFewestSamples = 200.0;
 constexpr double kFewestInTile = 64.0;
 constexpr double kAboveNoise = 3.0;  // deviations of a sample of the shorter exposure
-constexpr double kBelowClipping =
+constexpr double kClearOfClipping =
     4.0;  // deviations of every sample; twice as many, of the mean around it
 constexpr double kStandsOut = 6.0;  // deviations of a tile
 constexpr double kDarkest = 0.1;    // of a tile's light, for a logarithm
@@ -203,7 +203,8 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
       const double with_leak = electrons_[code].signal;
       const double deviation =
           std::sqrt(noise_variance(camera_, with_leak, electrons_[code].per_code));
-      if (footprint.at(px, py) == 0 || with_leak + kBelowClipping * deviation > clipping_electrons_)
+      if (footprint.at(px, py) == 0 ||
+          with_leak + kClearOfClipping * deviation > clipping_electrons_)
         return std::nullopt;
       const double black = black_of(longer, place(px, py), electrons_).electrons.signal;
       light[v][u] = with_leak - black * longer.light_seconds / longer.black_seconds;
@@ -211,7 +212,7 @@ std::optional<ExposureComparer::Sample> ExposureComparer::sample_at(
     }
   }
   const Electrons& own = electrons_[longer.light->at(x, y, channel)];
-  if (raw + 2.0 * kBelowClipping * std::sqrt(noise_variance(camera_, raw, own.per_code)) >
+  if (raw + 2.0 * kClearOfClipping * std::sqrt(noise_variance(camera_, raw, own.per_code)) >
       clipping_electrons_)
     return std::nullopt;
 

@@ -1,6 +1,7 @@
 #include "reconstruct/host/field_kernels.h"
 
 #include <cstdint>
+#include <type_traits>
 
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
 #undef HWY_TARGET_INCLUDE
@@ -150,24 +151,31 @@ HWY_INLINE void relax_lines(
   });
 }
 
-void relax(const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx) {
+/// kernel(lines, which of f they begin with, how many as a type): all at once, or one after another.
+template <class F>
+HWY_INLINE void for_lines(const FieldLines& f, const F& kernel) {
   if (f.count == kFieldsAtOnce) {
-    relax_lines<kFieldsAtOnce>(k, f, to, first, nx);
+    kernel(f, 0, std::integral_constant<int, kFieldsAtOnce>());
     return;
   }
-  for (int n = 0; n < f.count; ++n) relax_lines<1>(k, {{f.b[n]}, {f.x[n]}, 1}, to + n, first, nx);
+  for (int n = 0; n < f.count; ++n)
+    kernel(FieldLines{{f.b[n]}, {f.x[n]}, 1}, n, std::integral_constant<int, 1>());
 }
 
-/// r = scale a and sums += a^2, where a = at(n, i, cells).
-template <class T>
-struct Kept {
-  const double* scale;
-  T* const* r;
-  double* sums;
-};
+void relax(const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx) {
+  for_lines(f, [&](const FieldLines& some, int begin, auto count) HWY_ATTR {
+    relax_lines<count>(k, some, to + begin, first, nx);
+  });
+}
 
+template <class T>
+HWY_INLINE ResidualLines<T> from(const ResidualLines<T>& to, int begin) {
+  return {to.scale + begin, to.r + begin, to.sums + begin};
+}
+
+/// values(i, cells, a) puts b - K x of every field into a.
 template <int N, class T, class F>
-HWY_INLINE void keep_lines(const Kept<T>& kept, int first, int nx, const F& values) {
+HWY_INLINE void keep_lines(const ResidualLines<T>& to, int first, int nx, const F& values) {
   V sum[N];
   for (int n = 0; n < N; ++n) sum[n] = hn::Zero(D());
   for_registers(first, nx, [&](int i, const auto& cells) HWY_ATTR {
@@ -176,18 +184,18 @@ HWY_INLINE void keep_lines(const Kept<T>& kept, int first, int nx, const F& valu
     for (int n = 0; n < N; ++n) {
       a[n] = hn::IfThenElseZero(cells.all, a[n]);
       sum[n] = hn::MulAdd(a[n], a[n], sum[n]);
-      if (kept.r[n] != nullptr)
+      if (to.r[n] != nullptr)
         store_every_other(
-            hn::Mul(a[n], hn::Set(D(), kept.scale[n])), kept.r[n] + i / 2, (first + i) % 2);
+            hn::Mul(a[n], hn::Set(D(), to.scale[n])), to.r[n] + i / 2, (first + i) % 2);
     }
   });
-  for (int n = 0; n < N; ++n) kept.sums[n] += hn::GetLane(hn::SumOfLanes(D(), sum[n]));
+  for (int n = 0; n < N; ++n) to.sums[n] += hn::GetLane(hn::SumOfLanes(D(), sum[n]));
 }
 
 template <int N, class T>
 void residual_lines(
-    const LineCoefficients& k, const FieldLines& f, const Kept<T>& kept, int first, int nx) {
-  keep_lines<N>(kept, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+    const LineCoefficients& k, const FieldLines& f, const ResidualLines<T>& to, int first, int nx) {
+  keep_lines<N>(to, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
     const Joins g = joins_at(k, i, cells);
     const V diagonal = hn::MaskedLoad(cells.all, D(), k.diagonal + i);
     for (int n = 0; n < N; ++n) {
@@ -211,10 +219,10 @@ template <int N, class T>
 void dark_residual_lines(const LineCoefficients& k,
                          const InverseLines<T>& inverse,
                          const FieldLines& f,
-                         const Kept<T>& kept,
+                         const ResidualLines<T>& to,
                          int first,
                          int nx) {
-  keep_lines<N>(kept, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+  keep_lines<N>(to, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
     const V unit = hn::Set(D(), inverse.unit);
     const auto over = [&](V g, const T* at, M there) HWY_ATTR {
       return hn::Mul(hn::Mul(g, unit), load_inverse(at + i, there));
@@ -234,37 +242,23 @@ void dark_residual_lines(const LineCoefficients& k,
 }
 
 template <class T>
-void residual(const LineCoefficients& k,
-              const FieldLines& f,
-              const double* scale,
-              T* const* r,
-              double* sums,
-              int first,
-              int nx) {
-  if (f.count == kFieldsAtOnce) {
-    residual_lines<kFieldsAtOnce>(k, f, Kept<T>{scale, r, sums}, first, nx);
-    return;
-  }
-  for (int n = 0; n < f.count; ++n)
-    residual_lines<1>(k, {{f.b[n]}, {f.x[n]}, 1}, Kept<T>{scale + n, r + n, sums + n}, first, nx);
+void residual(
+    const LineCoefficients& k, const FieldLines& f, const ResidualLines<T>& to, int first, int nx) {
+  for_lines(f, [&](const FieldLines& some, int begin, auto count) HWY_ATTR {
+    residual_lines<count>(k, some, from(to, begin), first, nx);
+  });
 }
 
 template <class T>
 void dark_residual(const LineCoefficients& k,
                    const InverseLines<T>& inverse,
                    const FieldLines& f,
-                   const double* scale,
-                   T* const* r,
-                   double* sums,
+                   const ResidualLines<T>& to,
                    int first,
                    int nx) {
-  if (f.count == kFieldsAtOnce) {
-    dark_residual_lines<kFieldsAtOnce>(k, inverse, f, Kept<T>{scale, r, sums}, first, nx);
-    return;
-  }
-  for (int n = 0; n < f.count; ++n)
-    dark_residual_lines<1>(
-        k, inverse, {{f.b[n]}, {f.x[n]}, 1}, Kept<T>{scale + n, r + n, sums + n}, first, nx);
+  for_lines(f, [&](const FieldLines& some, int begin, auto count) HWY_ATTR {
+    dark_residual_lines<count>(k, inverse, some, from(to, begin), first, nx);
+  });
 }
 
 template <class T>

@@ -41,6 +41,15 @@ struct InverseLines {
 /// Fields that share one look at the coefficients.
 constexpr int kFieldsAtOnce = 2;
 
+/// What becomes of the residual of a line of as many fields: r = scale (b - K x), packed, unless r is null; sums += the
+/// sum of (b - K x)^2.
+template <class T>
+struct ResidualLines {
+  const double* scale;
+  T* const* r;
+  double* sums;
+};
+
 /// One line of up to kFieldsAtOnce fields.
 struct FieldLines {
   std::array<NearLines, kFieldsAtOnce> b;
@@ -57,21 +66,17 @@ struct FieldKernels {
   /// x = (b + sum g x) / D in every other cell of `to`, one line a field.
   void (*relax)(
       const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx);
-  /// r = scale (b - K x) in every other cell, packed, unless r is null; sums[m] += the sum of (b - K x)^2 there.
+  /// b - K x in every other cell.
   void (*residual)(const LineCoefficients& k,
                    const FieldLines& f,
-                   const double* scale,
-                   T* const* r,
-                   double* sums,
+                   const ResidualLines<T>& to,
                    int first,
                    int nx);
   /// The same with x = b / D in the other cells and 0 in these: b + sum g b / D, the D of the neighbour. f.x is not read.
   void (*dark_residual)(const LineCoefficients& k,
                         const InverseLines<T>& inverse,
                         const FieldLines& f,
-                        const double* scale,
-                        T* const* r,
-                        double* sums,
+                        const ResidualLines<T>& to,
                         int first,
                         int nx);
   /// x += factor (c + more) in every other cell; both packed, either null.

@@ -146,12 +146,11 @@ void HostPasses<T, S>::residual_rows(Rows rows, int z, int thread) {
       }
       const LineCoefficients k = line_coefficients(y, z);
       const int first = first_of(kBlack, y, z);
-      double* sums = &work_.norm_sums[sums_at(z, 0) + m];
+      const ResidualLines<T> to{scale.data(), r.data(), &work_.norm_sums[sums_at(z, 0) + m]};
       if (dark_)
-        fields_.dark_residual(
-            k, inverse_lines(y, z), lines, scale.data(), r.data(), sums, first, grid_.nx);
+        fields_.dark_residual(k, inverse_lines(y, z), lines, to, first, grid_.nx);
       else
-        fields_.residual(k, lines, scale.data(), r.data(), sums, first, grid_.nx);
+        fields_.residual(k, lines, to, first, grid_.nx);
     }
   if (!keeps_) return;
   const std::size_t field = line * rows.count();
