@@ -19,7 +19,6 @@ namespace {
 using Logs = Eigen::Vector2d;  // log sigma_s', log sigma_a
 
 constexpr int kMaxIterations = 20;
-constexpr int kScoutIterations = 4;
 constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
 constexpr double kDifference = 1e-2;
@@ -27,7 +26,11 @@ constexpr double kConverged = 1e-3;  // change of the logarithms
 constexpr double kNoMove =
     2e-3;                        // of them: where it leads nowhere the solves' tolerance is reached
 constexpr std::size_t kFew = 4;  // illuminations that two numbers are found from
-constexpr double kUnexplained = 0.25;        // of the data's power
+constexpr double kUnexplained = 0.25;  // of the data's power
+constexpr double kMuchLower = 0.25;    // times
+constexpr double kFarAbove = 2.0;      // times
+constexpr double kSameEnd = 0.05;      // apart, of the logarithms
+constexpr int kScoutIterations = 4;
 constexpr std::size_t kSketchCells = 20000;  // the largest grid that a start is sought on
 constexpr double kSecant =
     0.3;  // a move of the logarithms after which the slopes are worth keeping
@@ -105,19 +108,19 @@ class Fit {
 
   Logs bounded(const Logs& logs) const { return logs.cwiseMax(lower_).cwiseMin(upper_); }
 
-  // Some steps from the best absorption, 0.0003 to 0.1 of scattering, of each optical thickness, and on from the best of
-  // those: a thin block that absorbs and a thick one that does not are two minima, and the table is too coarse to tell.
+  // From the best absorption, 0.0003 to 0.1 of scattering, of each optical thickness, the lowest end: neither the table nor
+  // the first steps tell which that is. A way that joins an earlier one's end, or stays far above it, is left.
   Result<HomogeneousFit> from_best_of(std::initializer_list<double> depths) {
-    HomogeneousFit best;
-    best.chi_squared = std::numeric_limits<double>::infinity();
+    HomogeneousFit best = unexplained();
     for (const double depth : depths) {
       const auto start = best_absorption(depth);
       if (!start) return start.error();
-      auto scout = from(*start, kScoutIterations);
-      if (!scout) return scout;
-      if (scout->chi_squared < best.chi_squared) best = *std::move(scout);
+      auto end = from(*start, best);
+      if (!end) return end;
+      if (end->chi_squared < best.chi_squared) best = *std::move(end);
     }
-    return from({std::log(best.reduced_scattering), std::log(best.absorption)});
+    best.solves = objective_.solves();
+    return best;
   }
 
   bool explains(const HomogeneousFit& fit) const {
@@ -133,16 +136,16 @@ class Fit {
     return sum;
   }
 
-  Result<HomogeneousFit> from(Logs logs, int most_iterations = kMaxIterations) {
+  Result<HomogeneousFit> from(Logs logs, const HomogeneousFit& rival = unexplained()) {
     auto r = residuals(logs);
     if (!r) return r.error();
     State at{logs, *std::move(r)};
     int iteration = 0;
-    while (iteration < most_iterations) {
+    while (iteration < kMaxIterations) {
       ++iteration;
       const auto moved = step(at);
       if (!moved) return moved.error();
-      if (*moved < kConverged) break;
+      if (*moved < kConverged || loses(at, rival, iteration)) break;
       if (*moved > kSecant) at.slopes.reset();
     }
     return HomogeneousFit{.reduced_scattering = std::exp(at.logs[0]),
@@ -234,6 +237,19 @@ class Fit {
     std::optional<Slopes> slopes = std::nullopt;
   };
 
+  static HomogeneousFit unexplained() {
+    HomogeneousFit none;
+    none.chi_squared = std::numeric_limits<double>::infinity();
+    return none;
+  }
+
+  static bool loses(const State& at, const HomogeneousFit& rival, int iteration) {
+    if (!std::isfinite(rival.chi_squared)) return false;
+    const Logs end(std::log(rival.reduced_scattering), std::log(rival.absorption));
+    if ((at.logs - end).cwiseAbs().maxCoeff() < kSameEnd) return true;
+    return iteration >= kScoutIterations && at.r.squaredNorm() > kFarAbove * rival.chi_squared;
+  }
+
   // One Levenberg-Marquardt step; returns how far the logarithms moved, 0 when nothing lower was
   // found. Slopes that are kept are those of before with what the step itself has shown (Broyden 1965, Math. Comput.
   // 19, Eq. 4.5); where they lead nowhere they are taken afresh.
@@ -280,10 +296,17 @@ class Fit {
   Logs upper_;
 };
 
+// A thin slab that absorbs and a thick one that does not are two minima. Diffusion hardly holds in the thin one, so that it has
+// to be much lower: where neither explains the pictures (a coarse grid, veins) it is not to be had for a better fit.
 // Through a slab less light comes the more it scatters, through a film more: what no slab explains may be a film.
 Result<HomogeneousFit> sketched(Fit& sketch) {
-  auto fit = sketch.from_best_of({2.0, 6.0, 18.0, 60.0});
-  if (!fit || sketch.explains(*fit)) return fit;
+  auto fit = sketch.from_best_of({6.0, 18.0, 60.0});
+  if (!fit) return fit;
+  auto thin = sketch.from_best_of({2.0});
+  if (!thin) return thin;
+  if (thin->chi_squared < kMuchLower * fit->chi_squared) fit = thin;
+  fit->solves = thin->solves;  // counted by the sketch
+  if (sketch.explains(*fit)) return fit;
   auto thinner = sketch.from_best_of({0.02, 0.1, 0.5});
   if (!thinner || thinner->chi_squared < fit->chi_squared) return thinner;
   fit->solves = thinner->solves;  // counted by the sketch

