@@ -10,7 +10,6 @@ namespace {
 
 using support::DngOptions;
 using support::make_dng;
-using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 constexpr int kWidth = 96;
