@@ -81,17 +81,11 @@ struct EdgeCells : Cells {
   }
 };
 
-/// The lanes of those cells; whatever lies in the others, where it can be read.
-HWY_INLINE V load(const double* at, M cells, const EdgeCells&) {
-  return hn::MaskedLoad(cells, D(), at);
-}
-HWY_INLINE V load(const double* at, M, const Cells&) { return hn::LoadU(D(), at); }
+/// The lanes of some cells only: another thread may be writing the others.
+HWY_INLINE V load(const double* at, M cells) { return hn::MaskedLoad(cells, D(), at); }
 
-HWY_INLINE void store(V a, double* at, const EdgeCells& cells) {
-  hn::BlendedStore(a, cells.all, D(), at);
-}
 HWY_INLINE void store(V a, double* at, const Cells& cells) {
-  hn::StoreU(hn::IfThenElse(cells.all, a, hn::LoadU(D(), at)), D(), at);
+  hn::BlendedStore(a, cells.all, D(), at);
 }
 
 /// f(i, cells) for every register of a line.
@@ -124,14 +118,13 @@ HWY_INLINE Joins joins_at(const LineCoefficients& k, int i, const Cells& cells) 
 }
 
 /// sum + sum g u over the neighbours, which have the other colour: nothing else counts.
-template <class C>
-HWY_INLINE V add_neighbours(V sum, const Joins& g, const NearLines& u, int i, const C& cells) {
-  sum = hn::MulAdd(g.x_before, load(u.at + i - 1, cells.later, cells), sum);
-  sum = hn::MulAdd(g.x_after, load(u.at + i + 1, cells.inner, cells), sum);
-  sum = hn::MulAdd(g.y_before, load(u.y_before + i, cells.all, cells), sum);
-  sum = hn::MulAdd(g.y_after, load(u.y_after + i, cells.all, cells), sum);
-  sum = hn::MulAdd(g.z_before, load(u.z_before + i, cells.all, cells), sum);
-  return hn::MulAdd(g.z_after, load(u.z_after + i, cells.all, cells), sum);
+HWY_INLINE V add_neighbours(V sum, const Joins& g, const NearLines& u, int i, const Cells& cells) {
+  sum = hn::MulAdd(g.x_before, load(u.at + i - 1, cells.later), sum);
+  sum = hn::MulAdd(g.x_after, load(u.at + i + 1, cells.inner), sum);
+  sum = hn::MulAdd(g.y_before, load(u.y_before + i, cells.all), sum);
+  sum = hn::MulAdd(g.y_after, load(u.y_after + i, cells.all), sum);
+  sum = hn::MulAdd(g.z_before, load(u.z_before + i, cells.all), sum);
+  return hn::MulAdd(g.z_after, load(u.z_after + i, cells.all), sum);
 }
 
 template <int N>
@@ -145,7 +138,7 @@ HWY_INLINE void relax_lines(
     for (int n = 0; n < N; ++n) {
       hwy::Prefetch(f.b[n].at + i + kAhead);
       hwy::Prefetch(f.x[n].z_after + i + kAhead);
-      const V sum = add_neighbours(load(f.b[n].at + i, cells.all, cells), g, f.x[n], i, cells);
+      const V sum = add_neighbours(load(f.b[n].at + i, cells.all), g, f.x[n], i, cells);
       store(hn::Mul(sum, inverse), to[n] + i, cells);
     }
   });
@@ -201,8 +194,8 @@ void residual_lines(
     for (int n = 0; n < N; ++n) {
       hwy::Prefetch(f.b[n].at + i + kAhead);
       hwy::Prefetch(f.x[n].z_after + i + kAhead);
-      a[n] = load(f.b[n].at + i, cells.all, cells);
-      a[n] = hn::NegMulAdd(diagonal, load(f.x[n].at + i, cells.all, cells), a[n]);
+      a[n] = load(f.b[n].at + i, cells.all);
+      a[n] = hn::NegMulAdd(diagonal, load(f.x[n].at + i, cells.all), a[n]);
       a[n] = add_neighbours(a[n], g, f.x[n], i, cells);
     }
   });
@@ -236,7 +229,7 @@ void dark_residual_lines(const LineCoefficients& k,
          over(g.z_after, inverse.z_after, cells.all)};
     for (int n = 0; n < N; ++n) {
       hwy::Prefetch(f.b[n].z_after + i + kAhead);
-      a[n] = add_neighbours(load(f.b[n].at + i, cells.all, cells), g, f.b[n], i, cells);
+      a[n] = add_neighbours(load(f.b[n].at + i, cells.all), g, f.b[n], i, cells);
     }
   });
 }
