@@ -65,11 +65,8 @@ struct Cells {
   M all;
   M later;
   M inner;
-};
 
-/// Those at either end of a line, where a vector may reach beyond it.
-struct EdgeCells : Cells {
-  HWY_INLINE EdgeCells(M colour, int i, int nx) : Cells{colour, colour, colour} {
+  HWY_INLINE Cells(M colour, int i, int nx) : all(colour), later(colour), inner(colour) {
     const D d;
     const auto left = [&](int cells)
                           HWY_ATTR { return hn::FirstN(d, static_cast<std::size_t>(cells)); };
@@ -95,10 +92,7 @@ HWY_INLINE void for_registers(int first, int nx, const F& f) {
   M colour = every_other(0, first);
   for (int i = 0; i < nx; i += step) {
     if (step == 1) colour = every_other(i, first);
-    if (i > 0 && i + step < nx)
-      f(i, Cells{colour, colour, colour});
-    else
-      f(i, EdgeCells(colour, i, nx));
+    f(i, Cells(colour, i, nx));
   }
 }
 
@@ -130,7 +124,7 @@ HWY_INLINE V add_neighbours(V sum, const Joins& g, const NearLines& u, int i, co
 template <int N>
 HWY_INLINE void relax_lines(
     const LineCoefficients& k, const FieldLines& f, double* const* to, int first, int nx) {
-  for_registers(first, nx, [&](int i, const auto& cells) HWY_ATTR {
+  for_registers(first, nx, [&](int i, const Cells& cells) HWY_ATTR {
     const Joins g = joins_at(k, i, cells);
     const V one = hn::Set(D(), 1.0);
     const V diagonal = hn::MaskedLoad(cells.all, D(), k.diagonal + i);
@@ -171,7 +165,7 @@ template <int N, class T, class F>
 HWY_INLINE void keep_lines(const ResidualLines<T>& to, int first, int nx, const F& values) {
   V sum[N];
   for (int n = 0; n < N; ++n) sum[n] = hn::Zero(D());
-  for_registers(first, nx, [&](int i, const auto& cells) HWY_ATTR {
+  for_registers(first, nx, [&](int i, const Cells& cells) HWY_ATTR {
     V a[N];
     values(i, cells, a);
     for (int n = 0; n < N; ++n) {
@@ -188,7 +182,7 @@ HWY_INLINE void keep_lines(const ResidualLines<T>& to, int first, int nx, const 
 template <int N, class T>
 void residual_lines(
     const LineCoefficients& k, const FieldLines& f, const ResidualLines<T>& to, int first, int nx) {
-  keep_lines<N>(to, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+  keep_lines<N>(to, first, nx, [&](int i, const Cells& cells, V* a) HWY_ATTR {
     const Joins g = joins_at(k, i, cells);
     const V diagonal = hn::MaskedLoad(cells.all, D(), k.diagonal + i);
     for (int n = 0; n < N; ++n) {
@@ -215,7 +209,7 @@ void dark_residual_lines(const LineCoefficients& k,
                          const ResidualLines<T>& to,
                          int first,
                          int nx) {
-  keep_lines<N>(to, first, nx, [&](int i, const auto& cells, V* a) HWY_ATTR {
+  keep_lines<N>(to, first, nx, [&](int i, const Cells& cells, V* a) HWY_ATTR {
     const V unit = hn::Set(D(), inverse.unit);
     const auto over = [&](V g, const T* at, M there) HWY_ATTR {
       return hn::Mul(hn::Mul(g, unit), load_inverse(at + i, there));
