@@ -16,6 +16,7 @@ using namespace render;  // NOLINT(google-build-using-namespace): a file about i
 constexpr std::array<std::string_view, 4> kLightKinds{"directional", "point", "spot", "disc"};
 constexpr std::array<std::string_view, 2> kEntries{"collimated", "diffuse"};
 constexpr std::array<std::string_view, 3> kMethods{"graph", "elements", "polygrid"};
+constexpr std::array<std::string_view, 2> kWeights{"two_point", "as_published"};
 constexpr std::array<std::string_view, 4> kBoundaries{"two_moment", "jensen", "keijzer", "milne"};
 
 void visit_picture(Fields& fields, PictureOptions& p) {
@@ -98,6 +99,12 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.whole({"corrections", "at most, of a graph's links that lean on their faces; 0: none"},
                d.corrections,
                Range::between(0, 100));
+  fields.one_of({"weights", "of a graph's links; as_published (Wang 2010) is for comparison only"},
+                d.weights,
+                kWeights);
+  fields.check(d.weights == GraphWeights::kTwoPoint || d.method == Discretisation::kGraph,
+               "weights",
+               "they are those of a graph's links: as_published needs method = \"graph\"");
   fields.one_of({"boundary", "condition at the surface"}, d.boundary, kBoundaries);
 }
 

@@ -1,25 +1,18 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
 
 #include "base/thread_team.h"
 #include "reconstruct/diffusion/boundary.h"
+#include "render/graph/graph_weights.h"
 #include "render/graph/optics.h"
 #include "render/graph/quad_graph.h"
 #include "render/solver/aggregation.h"
 #include "render/solver/lanes.h"
 
 namespace opaline::render {
-
-/// How neighbours weigh in one relaxation step.
-enum class GraphWeights : std::uint8_t {
-  kAsPublished,  ///< kappa_k / d^2 of the link (Wang 2010, Eqs. 5 and 8): a discretisation of laplace(kappa phi), and not
-                 ///< consistent on irregular tetrahedra (docs/physics.md)
-  kTwoPoint,     ///< those of TwoPoint
-};
 
 /// The solution scheme of Wang 2010, to compare with: plain relaxation on independent graphs, coarsest first, each started
 /// from the one before,

@@ -37,6 +37,8 @@ class TwoPoint {
   const LaneMatrix<T>& matrix() const { return matrix_; }
   /// The right-hand side of light q, transmitted into the surface, W/mm^2.
   void load(std::span<const std::array<float, 3>> q, std::vector<Lanes<T>>& b) const;
+  /// What a watt scattered in node i adds to its right-hand side.
+  double load_of_power(std::size_t /*i*/) const { return 1.0; }
   /// `delta`, where it is not empty, is what the fluence at the foot of each surface node's link is more than the inner
   /// node's (render/graph/leaning_links.h).
   SurfaceLight surface_light(std::span<const std::array<float, 3>> q,

@@ -3,6 +3,7 @@
 
 #include "render/graph/leaning_links.h"
 #include "render/graph/nearest.h"
+#include "render/graph/published_weights.h"
 #include "render/graph/two_point.h"
 #include "render/scene/fresh_hierarchy.h"
 #include "render/scene/subsurface_methods.h"
@@ -18,7 +19,8 @@ using reconstruct::diffusion::SolveSummary;
 constexpr int kNearest = 4;
 constexpr double kSinglePrecision = 1e-5;  // of the residual; below it numbers are double
 
-template <class T, class Graph>
+/// Diffusion: TwoPoint<T, Graph>, or PublishedWeights<T>, whose unknowns are kappa phi.
+template <class T, class Graph, class Diffusion>
 class GraphSubsurface final : public Subsurface {
  public:
   GraphSubsurface(Graph graph, TetMesh mesh, const SubsurfaceSetting& setting)
@@ -29,7 +31,7 @@ class GraphSubsurface final : public Subsurface {
         phi_(large_vector(graph_.inner.size(), Lanes<T>::zero())) {}
 
   Result<void> begin_with(const SubsurfaceSetting& setting) {
-    if constexpr (!kIsLattice) {
+    if constexpr (kMayLean) {
       if (options_.corrections > 0)
         lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, setting.team);
     }
@@ -72,7 +74,10 @@ class GraphSubsurface final : public Subsurface {
                      std::stop_token stop) override {
     diffusion_.load(q, load_);
     for (std::size_t i = 0; i < scattered.size(); ++i) {
-      for (int c = 0; c < 3; ++c) load_[i].set(c, load_[i][c] + static_cast<T>(scattered[i][c]));
+      for (int c = 0; c < 3; ++c) {
+        const double more = diffusion_.load_of_power(i) * scattered[i][c];
+        load_[i].set(c, load_[i][c] + static_cast<T>(more));
+      }
     }
     const auto solve = [&](const std::vector<Lanes<T>>& load, double tolerance) {
       auto options = solve_options();
@@ -84,8 +89,7 @@ class GraphSubsurface final : public Subsurface {
   }
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
-    const SurfaceLight light = lean_ ? diffusion_.surface_light(q, phi_, lean_->at_surface())
-                                     : diffusion_.surface_light(q, phi_);
+    const SurfaceLight light = light_of(q);
     if constexpr (kIsLattice) {
       return {interpolated(light.fluence), interpolated(light.net_flux)};
     } else {
@@ -95,6 +99,14 @@ class GraphSubsurface final : public Subsurface {
 
  private:
   static constexpr bool kIsLattice = std::is_same_v<Graph, Polygrid>;
+  static constexpr bool kMayLean = std::is_same_v<Diffusion, TwoPoint<T, QuadGraph>>;
+
+  SurfaceLight light_of(std::span<const std::array<float, 3>> q) const {
+    if constexpr (kMayLean) {
+      if (lean_) return diffusion_.surface_light(q, phi_, lean_->at_surface());
+    }
+    return diffusion_.surface_light(q, phi_);
+  }
 
   Values interpolated(const Values& of_nodes) const {
     Values values(surface().vertices.size());
@@ -110,7 +122,7 @@ class GraphSubsurface final : public Subsurface {
 
   Graph graph_;
   Boundary boundary_;
-  TwoPoint<T, Graph> diffusion_;
+  Diffusion diffusion_;
   std::unique_ptr<FreshHierarchy<T>> solver_;
   std::unique_ptr<LeaningLinks<T>> lean_;  // none: as two points have it
   std::vector<Lanes<T>> load_;
@@ -118,37 +130,46 @@ class GraphSubsurface final : public Subsurface {
   Interpolation<float> to_vertices_;
 };
 
-template <class T, class Graph>
+template <class T, class Diffusion, class Graph>
 Result<std::unique_ptr<Subsurface>> made_of(Graph graph,
                                             TetMesh mesh,
                                             const SubsurfaceSetting& setting) {
-  auto made =
-      std::make_unique<GraphSubsurface<T, Graph>>(std::move(graph), std::move(mesh), setting);
+  auto made = std::make_unique<GraphSubsurface<T, Graph, Diffusion>>(
+      std::move(graph), std::move(mesh), setting);
   if (auto begun = made->begin_with(setting); !begun) return begun.error();
   return std::unique_ptr<Subsurface>(std::move(made));
 }
 
-template <class Graph>
+template <template <class> class Diffusion, class Graph>
 Result<std::unique_ptr<Subsurface>> of_precision(Graph graph,
                                                  TetMesh mesh,
                                                  const SubsurfaceSetting& setting) {
-  const auto make =
-      setting.options.tolerance < kSinglePrecision ? made_of<double, Graph> : made_of<float, Graph>;
+  const auto make = setting.options.tolerance < kSinglePrecision
+                        ? made_of<double, Diffusion<double>, Graph>
+                        : made_of<float, Diffusion<float>, Graph>;
   return make(std::move(graph), std::move(mesh), setting);
 }
+
+template <class T>
+using OnGraph = TwoPoint<T, QuadGraph>;
+template <class T>
+using OnLattice = TwoPoint<T, Polygrid>;
 
 }  // namespace
 
 Result<std::unique_ptr<Subsurface>> make_graph_subsurface(TetMesh mesh,
                                                           const SubsurfaceSetting& setting) {
   QuadGraph graph = make_quad_graph(mesh);
-  return of_precision(std::move(graph), std::move(mesh), setting);
+  if (setting.options.weights == GraphWeights::kAsPublished) {
+    return of_precision<PublishedWeights>(std::move(graph), std::move(mesh), setting);
+  }
+  return of_precision<OnGraph>(std::move(graph), std::move(mesh), setting);
 }
 
 Result<std::unique_ptr<Subsurface>> make_polygrid_subsurface(Polygrid grid,
                                                              TetMesh mesh,
                                                              const SubsurfaceSetting& setting) {
-  return of_precision(std::move(grid), std::move(mesh), setting);
+  return of_precision<OnLattice>(std::move(grid), std::move(mesh), setting);
 }
 
 }  // namespace opaline::render

@@ -11,6 +11,7 @@
 #include "reconstruct/diffusion/boundary.h"
 #include "render/deform/deform_options.h"
 #include "render/edit/edit_options.h"
+#include "render/graph/graph_weights.h"
 
 /// A scene as plain values: what a file describes and SceneRenderer draws. Lengths in mm; colours are red, green, blue.
 namespace opaline::render {
@@ -142,7 +143,8 @@ struct DiffusionOptions {
   double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
   double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
   double interior_growth = 0.1;  ///< the papers' K
-  double tolerance = 1e-4;       ///< relative residual
+  GraphWeights weights = GraphWeights::kTwoPoint;  ///< of kGraph
+  double tolerance = 1e-4;                         ///< relative residual
   int corrections = 8;  ///< of a graph's links that lean, at most so many a solution; 0: none
   int max_iterations = 300;
   reconstruct::diffusion::BoundaryModel boundary =

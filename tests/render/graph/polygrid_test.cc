@@ -68,6 +68,51 @@ TEST(Polygrid, ALitSphereConvergesToTheExactSolution) {
   EXPECT_LT(sphere_error(0.5), 0.8 * fine);
 }
 
+/// w_j = W_2j + W_4j + W_6j of Wang 2008, appendix B, W the inverse of the rows (dx_j, dx_j^2/2, dy_j, dy_j^2/2, dz_j, dz_j^2/2):
+/// what makes sum_j w_j (f_j - f_0) the Laplacian of f = x^2/2, y^2/2 and z^2/2, and 0 for x, y and z.
+std::array<double, 6> appendix_b_weights(const std::array<Vec3, 6>& offsets) {
+  std::array<std::array<double, 7>, 6> rows{};  // W^T w = (0, 1, 0, 1, 0, 1)
+  for (int j = 0; j < 6; ++j) {
+    const Vec3 d = offsets[j];
+    const std::array<double, 6> terms{
+        d.x, 0.5 * d.x * d.x, d.y, 0.5 * d.y * d.y, d.z, 0.5 * d.z * d.z};
+    for (int m = 0; m < 6; ++m) rows[m][j] = terms[m];
+  }
+  for (int m = 0; m < 6; ++m) rows[m][6] = m % 2;
+  for (int k = 0; k < 6; ++k) {
+    const auto most = std::max_element(rows.begin() + k, rows.end(), [k](auto& a, auto& b) {
+      return std::abs(a[k]) < std::abs(b[k]);
+    });
+    std::iter_swap(rows.begin() + k, most);
+    for (int m = 0; m < 6; ++m) {
+      const double factor = m == k ? 0.0 : rows[m][k] / rows[k][k];
+      for (int c = k; c < 7; ++c) rows[m][c] -= factor * rows[k][c];
+    }
+  }
+  std::array<double, 6> weights{};
+  for (int k = 0; k < 6; ++k) weights[k] = rows[k][6] / rows[k][k];
+  return weights;
+}
+
+TEST(Polygrid, InsideItsWeightsAreThoseOfWang2008AppendixB) {
+  const Polygrid grid = grid_of("torus", 0.5);
+  int inside = 0;
+  for (std::size_t i = 0; i < grid.inner.size(); ++i) {
+    const auto& links = grid.links[i];
+    if (links.size() != 6 || std::ranges::any_of(links, [](auto& l) { return l.inner < 0; }))
+      continue;
+    std::array<Vec3, 6> offsets;
+    for (int k = 0; k < 6; ++k) offsets[k] = grid.inner[links[k].inner] - grid.inner[i];
+    const auto weights = appendix_b_weights(offsets);
+    for (int k = 0; k < 6; ++k) {
+      const double own = links[k].area / links[k].length / grid.volumes[i];
+      ASSERT_NEAR(own, weights[k], 1e-9 * weights[k]);
+    }
+    ++inside;
+  }
+  EXPECT_GT(inside, 1000);
+}
+
 TEST(Polygrid, BoundaryNodesLieOnTheSurfaceAndCoverIt) {
   const Polygrid grid = grid_of("torus", 0.3);
   const auto torus = make_shape("torus", 20.0);
