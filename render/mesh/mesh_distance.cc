@@ -11,6 +11,10 @@ namespace {
 constexpr int kLeaf = 4;
 constexpr int kLookUp = 4096;  // fewer triangles are sorted without a look at the stop token
 constexpr double kFar = 2.0;   // in radii of a group
+// Of windings: a closed mesh's are that far from 0 and 1 where far groups stand for their triangles.
+constexpr double kOutside = 0.1;
+constexpr double kStepOfClear = 0.25;  // of the distance to the nearest triangle
+constexpr double kStepOfSize = 0.01;   // of the mesh
 
 double component(Vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
@@ -170,9 +174,25 @@ double MeshDistance::winding(Vec3 point) const {
   return orientation_ * angle / (4.0 * std::numbers::pi);
 }
 
+/// |w - 1/2| over how fast w changes, by central differences that stay clear of the triangles.
+double MeshDistance::to_film(Vec3 point, double around, double clear) const {
+  const double step = std::min(kStepOfClear * clear, kStepOfSize * length(bounds_.size()));
+  if (!(step > 0.0)) return 0.0;
+  const auto change = [&](Vec3 along) {
+    return (winding(point + along * step) - winding(point - along * step)) / (2.0 * step);
+  };
+  const double slope =
+      length({change({1.0, 0.0, 0.0}), change({0.0, 1.0, 0.0}), change({0.0, 0.0, 1.0})});
+  return slope > 0.0 ? std::abs(around - 0.5) / slope : std::numeric_limits<double>::infinity();
+}
+
 double MeshDistance::at(Vec3 point) const {
-  const double distance = unsigned_at(point);
-  return winding(point) > 0.5 ? -distance : distance;
+  const double around = winding(point);
+  double distance = unsigned_at(point);
+  if (around > kOutside && around < 1.0 - kOutside) {
+    distance = std::min(distance, to_film(point, around, distance));
+  }
+  return around > 0.5 ? -distance : distance;
 }
 
 }  // namespace opaline::render

@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <vector>
 
 #include "render/mesh/mesh_formats.h"
@@ -51,6 +54,8 @@ Result<TriangleMesh> decode_obj(std::string_view text, const std::stop_token& st
   TriangleMesh mesh;
   TextScanner scanner(text);
   std::vector<int> corners;
+  int highest = -1;  // vertex that a face names, and in which line
+  int highest_line = 0;
   while (auto line = scanner.next_line()) {
     if (stopped_at(static_cast<std::size_t>(scanner.line()), stop))
       return cancelled("reading the mesh");
@@ -62,7 +67,14 @@ Result<TriangleMesh> decode_obj(std::string_view text, const std::stop_token& st
       mesh.vertices.push_back(*vertex);
     } else if (keyword == "f") {
       if (auto added = add_face(words, scanner, corners, mesh); !added) return added.error();
+      const int most = *std::ranges::max_element(corners);
+      if (most > highest) highest_line = scanner.line();
+      highest = std::max(highest, most);
     }
+  }
+  if (highest >= static_cast<int>(mesh.vertices.size())) {
+    return invalid_argument(fmt::format(
+        "line {}: names vertex {} of {}", highest_line, highest + 1, mesh.vertices.size()));
   }
   return mesh;
 }

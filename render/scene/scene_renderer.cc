@@ -177,7 +177,7 @@ void SceneRenderer::note_resolution(const ObjectOptions& object, const Subsurfac
                     report.spacing_mm,
                     tetrahedra * finer * finer * finer));
   }
-  const double across = std::cbrt(report.volume_mm3);
+  const double across = 4.0 * report.volume_mm3 / report.area_mm2;  // on average (Cauchy's chord)
   if (across < kFewFreePaths * report.shortest_free_path) {
     statistics_.notes.push_back(fmt::format(
         "{}: only {:.2g} transport mean free paths across: diffusion is a poor model of it",

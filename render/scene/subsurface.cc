@@ -80,6 +80,15 @@ Result<std::unique_ptr<Subsurface>> set_up(TetMesh mesh,
   return make_polygrid_subsurface(*std::move(grid), std::move(mesh), setting);
 }
 
+double area_of(const TriangleMesh& mesh) {
+  double area = 0.0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3 a = mesh.vertices[i];
+    area += 0.5 * length(cross(mesh.vertices[j] - a, mesh.vertices[k] - a));
+  }
+  return area;
+}
+
 /// The vertices of a mesh's surface, numbered as surface_mesh() does.
 std::vector<int> surface_vertices(const TetMesh& mesh) {
   std::vector<int> used;
@@ -139,6 +148,7 @@ Result<std::unique_ptr<Subsurface>> Subsurface::create(TetMesh mesh,
   report.unknowns =
       options.method == Discretisation::kElements ? (*made)->rest_.size() : (*made)->nodes_.size();
   own = report;
+  own.area_mm2 = area_of((*made)->surface_);
   (*made)->note_lengths();
   own.setup_seconds = seconds_since(start);
   if (stop.stop_requested()) return cancelled("setting up the diffusion");

@@ -41,6 +41,7 @@ class Subsurface {
     std::size_t unknowns = 0;
     double spacing_mm = 0.0;
     double volume_mm3 = 0.0;
+    double area_mm2 = 0.0;           ///< of the surface
     double smallest_dihedral = 0.0;  ///< degrees
     int components = 0;
     double shortest_diffusion_length =

@@ -9,10 +9,13 @@
 #include "base/io/volume_io.h"
 #include "render/edit/material_block.h"
 #include "render/graph/quad_graph.h"
+#include "render/scene/lost_parts.h"
 #include "render/scene/measured_finish.h"
 
 namespace opaline::render {
 namespace {
+
+constexpr double kWorthTelling = 1e-3;  // of a surface
 
 double longest_side(Vec3 size) { return std::max({size.x, size.y, size.z}); }
 
@@ -55,6 +58,7 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
   body->rest_box_ = body->own_box(0.0);
   body->drawn_ =
       std::make_unique<DrawnSurface>(body->subsurface_->surface(), *body->solid_, refinement);
+  if (shape->surface) body->note_lost(*shape->surface, stop);
   if (auto taken = body->take_finish(); !taken) return taken.error();
   if (!object.edits.empty()) {
     if (auto edited = body->edit(object.edits); !edited) return edited.error();
@@ -63,6 +67,17 @@ Result<std::unique_ptr<TranslucentBody>> TranslucentBody::create(const ObjectOpt
     if (auto bent = body->bend(object.deform); !bent) return bent.error();
   }
   return body;
+}
+
+void TranslucentBody::note_lost(const TriangleMesh& shape, const std::stop_token& stop) {
+  const double size = subsurface_->report().spacing_mm;
+  const double lost = lost_share(shape, subsurface_->surface(), size, stop);
+  if (lost < kWorthTelling) return;
+  notes_.push_back(
+      fmt::format("{:.2g} % of its surface is not there: parts thinner than elements of {:.3g} mm "
+                  "are lost, and sheets that enclose nothing; a smaller `spacing` shows the former",
+                  100.0 * lost,
+                  size));
 }
 
 Box TranslucentBody::own_box(double margin) const {

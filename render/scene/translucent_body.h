@@ -72,6 +72,7 @@ class TranslucentBody {
   Result<void> begin_editing();
   Result<void> take_material();
   Box own_box(double margin) const;
+  void note_lost(const TriangleMesh& shape, const std::stop_token& stop);
   double distance(Vec3 own_place) const { return solid_->at(scene_from_own_.apply(own_place)); }
   Result<std::size_t> turned_inside_out(std::size_t inverted, const DeformOptions& options);
 

@@ -70,6 +70,20 @@ TEST(MeshDistance, AHoleIsClosedAsBySoap) {
   }
 }
 
+TEST(MeshDistance, GrowsEvenlyThroughTheFilmOverAHole) {
+  TriangleMesh mesh = cube_mesh(10.0);
+  std::erase_if(mesh.triangles, [&](const auto& t) {
+    return std::ranges::all_of(t, [&](int v) { return mesh.vertices[v].z > 9.0; });
+  });
+  const auto distance = MeshDistance::create(mesh);
+  ASSERT_TRUE(distance);
+  for (const double x : {3.0, 5.0, 6.5}) {  // of a flat hole the film is flat
+    EXPECT_NEAR((*distance)->at({x, 5.0, 10.0}), 0.0, 1e-6);
+    EXPECT_NEAR((*distance)->at({x, 5.0, 9.7}), -0.3, 0.03);
+    EXPECT_NEAR((*distance)->at({x, 5.0, 10.3}), 0.3, 0.03);
+  }
+}
+
 TEST(MeshDistance, WhatOverlapsIsOneSolid) {
   TriangleMesh mesh = cube_mesh(2.0);
   append(mesh, cube_mesh(2.0, {1.0, 0.5, 0.5}));

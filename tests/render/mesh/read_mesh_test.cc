@@ -164,7 +164,7 @@ TEST(ReadMesh, AnErrorNamesTheLine) {
 TEST(ReadMesh, WhatIsNoMeshIsRefusedWithTheReason) {
   EXPECT_THAT(decode_mesh("obj", "# nothing\n").error().message, HasSubstr("no triangles"));
   EXPECT_THAT(decode_mesh("obj", "v 0 0 0\nf 1 2 3\n").error().message,
-              HasSubstr("names vertex 1 of 1"));
+              HasSubstr("line 2: names vertex 3 of 1"));
   EXPECT_THAT(decode_mesh("obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").error().message,
               HasSubstr("not finite"));
   EXPECT_THAT(decode_mesh("fbx", "").error().message, HasSubstr("obj, off, ply, stl"));

@@ -1,5 +1,6 @@
 #include "render/scene/translucent_body.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -33,6 +34,26 @@ DeformOptions bow(double move) {
   deform.handles = {{.point = {0, -1, -1}, .move = {0.0, 0.0, move}},
                     {.point = {2, -1, -1}, .move = {0.0, 0.0, move}}};
   return deform;
+}
+
+std::string box_obj(Vec3 low, Vec3 high, int before) {
+  std::string text;
+  for (int k = 0; k < 8; ++k) {
+    text += fmt::format("v {} {} {}\n",
+                        (k & 1) != 0 ? high.x : low.x,
+                        (k & 2) != 0 ? high.y : low.y,
+                        (k & 4) != 0 ? high.z : low.z);
+  }
+  for (const auto& f : {std::array{1, 3, 4, 2},
+                        std::array{5, 6, 8, 7},
+                        std::array{1, 2, 6, 5},
+                        std::array{3, 7, 8, 4},
+                        std::array{1, 5, 7, 3},
+                        std::array{2, 4, 8, 6}}) {
+    text +=
+        fmt::format("f {} {} {} {}\n", f[0] + before, f[1] + before, f[2] + before, f[3] + before);
+  }
+  return text;
 }
 
 Values light_from_above(const Subsurface& body) {
@@ -158,6 +179,21 @@ TEST_F(Body, TurnedInsideOutIsMarkedWhereAskedFor) {
   EXPECT_EQ(std::ranges::min(body->marks()), 0.0F);
   ASSERT_TRUE(body->bend(bow(1.0)));
   EXPECT_TRUE(body->marks().empty());
+}
+
+TEST_F(Body, SaysWhereElementsAreTooLargeForAThinLimb) {
+  const opaline::testing::TemporaryDirectory directory;
+  const auto file = directory.path() / "limb.obj";
+  std::ofstream(file) << box_obj({-5, -5, -5}, {5, 5, 5}, 0)
+                      << box_obj({4, -0.05, -0.05}, {30, 0.05, 0.05}, 8);
+  ObjectOptions object = torus();
+  object.shape.name.clear();
+  object.shape.size_mm = 0.0;
+  object.shape.file = file;
+  EXPECT_THAT(made(object, {.tetrahedra = 3000})->notes(),
+              ::testing::Contains(HasSubstr("of its surface is not there")));
+  std::ofstream(file) << box_obj({-5, -5, -5}, {5, 5, 5}, 0);
+  EXPECT_THAT(made(object, {.tetrahedra = 3000})->notes(), ::testing::IsEmpty());
 }
 
 TEST_F(Body, OnALatticeIsNotBent) {
