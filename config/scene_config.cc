@@ -77,10 +77,10 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.whole(
       {"directions",
        "in which diffuse light is followed behind each face to where it scatters first; 0: it "
-       "enters at the surface"},
+       "enters at the surface; -1: 4, and not while it moves"},
       d.directions,
-      Range::between(0, 1024));
-  fields.check(d.method != Discretisation::kPolygrid || d.directions == 0,
+      Range::between(DiffusionOptions::kAutomatic, 1024));
+  fields.check(d.method != Discretisation::kPolygrid || d.directions <= 0,
                "directions",
                "light is followed through tetrahedra: method = \"polygrid\" needs 0");
   fields.number({"tetrahedra", "about so many an object, if all were of one size"},

@@ -79,10 +79,13 @@ void measure_accuracy() {
     const auto solid = shape(name);
     const double spacing = render::spacing_for(render::estimate_volume(*solid), 1.4e5);
     const auto lit = [&](render::Discretisation method, double size, double growth) {
-      return LitMarble(
-          *solid,
-          {.method = method, .spacing_mm = size, .interior_growth = growth, .tolerance = 1e-8},
-          team);
+      return LitMarble(*solid,
+                       {.method = method,
+                        .directions = 0,
+                        .spacing_mm = size,
+                        .interior_growth = growth,
+                        .tolerance = 1e-8},
+                       team);
     };
     using enum render::Discretisation;
     const LitMarble reference = lit(kElements, 0.25 * spacing, 0.2);
@@ -119,7 +122,8 @@ void measure_geometry() {
   for (const char* name : {"torus", "figurine"}) {
     const auto solid = shape(name);
     const double spacing = render::spacing_for(render::estimate_volume(*solid), 1.4e5);
-    const render::DiffusionOptions options{.spacing_mm = spacing, .tolerance = 1e-8};
+    const render::DiffusionOptions options{
+        .directions = 0, .spacing_mm = spacing, .tolerance = 1e-8};
     render::DiffusionOptions finer = options;
     finer.spacing_mm = 0.5 * spacing;
     finer.interior_growth = 0.0;
@@ -141,6 +145,7 @@ void measure_dials() {
   using enum render::Discretisation;
   const LitMarble reference(*solid,
                             {.method = kElements,
+                             .directions = 0,
                              .spacing_mm = 0.5 * render::spacing_for(volume, 1.4e5),
                              .interior_growth = 0.0,
                              .tolerance = 1e-8},
@@ -154,6 +159,7 @@ void measure_dials() {
         measure_dial(fmt::format("{}-{}-{}", name, size, k),
                      *solid,
                      {.method = method,
+                      .directions = 0,
                       .spacing_mm = render::spacing_for(volume, tets),
                       .interior_growth = growth,
                       .corrections = corrections},
@@ -166,7 +172,8 @@ void measure_dials() {
 
 namespace {
 
-constexpr std::array kDirections{0, 4};
+constexpr std::array kDirections{std::pair{render::DiffusionOptions::kAutomatic, ""},
+                                 std::pair{0, "-0-directions"}};
 
 /// Elements of the size of 140 k tetrahedra all alike, K = 0.1.
 render::DiffusionOptions elements_of(const std::string& name, int directions) {
@@ -193,8 +200,8 @@ void measure_transport() {
   for (const std::string name : {"torus", "figurine"}) {
     print_transport_error(name + "-collimated",
                           transport_error(name, true, elements_of(name, 0), kPhotons, team));
-    for (const int directions : kDirections) {
-      const std::string which = fmt::format("{}-diffuse-{}-directions", name, directions);
+    for (const auto& [directions, label] : kDirections) {
+      const std::string which = fmt::format("{}-diffuse{}", name, label);
       auto options = elements_of(name, directions);
       print_transport_error(which, transport_error(name, false, options, kPhotons, team));
       options.boundary = BoundaryModel::kMilne;

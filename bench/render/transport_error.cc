@@ -116,7 +116,7 @@ Exitance diffused(const Case& lit,
     double net = 0.0;
     for (const int v : {i, j, k}) net += (*body)->lit().net_flux[v][kGreen] / 3.0;
     const double in =
-        lit.collimated || options.directions > 0 ? 0.0 : lit.q(lit.solid.normal(centre, 0.01));
+        lit.collimated || options.directions != 0 ? 0.0 : lit.q(lit.solid.normal(centre, 0.01));
     found.add(patches.at(centre), (net + in) * length(normal), length(normal));
   }
   return found;

@@ -7,6 +7,20 @@ namespace {
 
 using render::SceneStatistics;
 
+std::string name_of(render::DiffuseEntry entry) {
+  switch (entry) {
+    case render::DiffuseEntry::kAtSurface:
+      return "at the surface";
+    case render::DiffuseEntry::kFollowed:
+      return "followed";
+    case render::DiffuseEntry::kFollowedBefore:
+      return "followed before";
+    case render::DiffuseEntry::kDark:
+      break;
+  }
+  return "dark";
+}
+
 nlohmann::json object_json(const SceneStatistics::Object& object) {
   nlohmann::json json{{"name", object.name},
                       {"kind", object.translucent ? "translucent" : "opaque"},
@@ -20,6 +34,8 @@ nlohmann::json object_json(const SceneStatistics::Object& object) {
   json["components"] = object.body.components;
   json["iterations"] = object.iterations;
   json["relative_residual"] = object.relative_residual;
+  json["environment_entry"] = name_of(object.environment);
+  json["lamps_entry"] = name_of(object.lamps);
   return json;
 }
 
@@ -28,8 +44,8 @@ std::string object_line(const SceneStatistics::Object& object) {
     return fmt::format("{}: opaque, {} triangles\n", object.name, object.triangles);
   return fmt::format(
       "{}: {} tetrahedra of {:.3g} mm, angles from {:.1f} degrees; {} unknowns, {} iterations to a "
-      "relative "
-      "residual of {:.1e}; {} triangles\n",
+      "relative residual of {:.1e}; {} triangles; diffuse light: of the environment {}, of lamps "
+      "{}\n",
       object.name,
       object.body.tetrahedra,
       object.body.spacing_mm,
@@ -37,7 +53,9 @@ std::string object_line(const SceneStatistics::Object& object) {
       object.body.unknowns,
       object.iterations,
       object.relative_residual,
-      object.triangles);
+      object.triangles,
+      name_of(object.environment),
+      name_of(object.lamps));
 }
 
 }  // namespace

@@ -39,7 +39,8 @@ Vec3 direction_behind(std::size_t face, int k, int count) {
 FirstScattering first_scattering(const BeamDeposit& deposit,
                                  std::span<const Beam> beams,
                                  DepositAt where,
-                                 ThreadTeam& team) {
+                                 ThreadTeam& team,
+                                 const std::stop_token& stop) {
   const TetMesh& mesh = deposit.mesh();
   const bool at_vertices = where == DepositAt::kVertices;
   const std::size_t nodes = at_vertices ? mesh.vertices.size() : mesh.tets.size();
@@ -50,6 +51,7 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
     const std::size_t first = beams.size() * thread / team.size();
     const std::size_t last = beams.size() * (thread + 1) / team.size();
     for (const Beam& beam : beams.subspan(first, last - first)) {
+      if (stop.stop_requested()) return;
       deposit.follow(
           beam,
           [&](const BeamDeposit::Deposit& d) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "base/thread_team.h"
@@ -18,11 +19,12 @@ struct FirstScattering {
 enum class DepositAt : std::uint8_t { kTetrahedra, kVertices };
 
 /// Follows beams, a share of them in each thread of the team. At vertices, each deposit goes to the corners of its tetrahedron by its
-/// barycentric coordinates.
+/// barycentric coordinates. What is stopped is not to be used.
 FirstScattering first_scattering(const BeamDeposit& deposit,
                                  std::span<const Beam> beams,
                                  DepositAt where,
-                                 ThreadTeam& team);
+                                 ThreadTeam& team,
+                                 const std::stop_token& stop);
 
 /// Light that goes on behind each face in all directions, with the density cos theta / pi, as `directions` beams a face. They are
 /// stratified, and differ from face to face (Roberts' R2 sequence), so that few of them do: what a place gets comes from many

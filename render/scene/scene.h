@@ -135,11 +135,17 @@ enum class Discretisation : std::uint8_t { kGraph, kElements, kPolygrid };
 /// How the light of lamps goes on behind the surface (docs/physics.md, "How light enters"); an environment's is diffuse.
 enum class Entry : std::uint8_t { kCollimated, kDiffuse };
 
+/// Whether what is lit stands still, or a hand is moving it and the picture shall follow at once.
+enum class Pace : std::uint8_t { kAtRest, kMoving };
+
 struct DiffusionOptions {
+  static constexpr int kAutomatic = -1;
+
   Discretisation method = Discretisation::kElements;
   Entry entry = Entry::kCollimated;  ///< a polygrid takes kDiffuse whatever this is
   int directions =
-      0;  ///< in which diffuse light is followed behind each face to where it scatters first; 0: it enters at the surface
+      kAutomatic;  ///< in which diffuse light is followed behind each face to where it scatters first; 0: it enters at the
+                   ///< surface; automatic: 4, and not for what moves (Subsurface::light())
   double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
   double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
   double interior_growth = 0.1;  ///< the papers' K

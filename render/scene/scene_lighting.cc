@@ -115,11 +115,12 @@ void SceneRenderer::let_in(const Body& body, Entering& light, std::stop_token st
   const auto& places = body.body->subsurface().places();
   const double ior = looks_[body.object].ior;
   std::vector<std::atomic<bool>> reaches(sources_.size());
+  light.lamps.resize(places.size());
   for_each(places.size(), team_, stop, [&](std::size_t i) {
     for (std::size_t l = 0; l < sources_.size(); ++l) {
       const Colour q = passed(sources_[l], sample(sources_[l], places[i].place), places[i], ior);
       if (!is_black(q)) reaches[l] = true;
-      for (int c = 0; c < 3; ++c) light.q[i][c] += static_cast<float>(q[c]);
+      for (int c = 0; c < 3; ++c) light.lamps[i][c] += static_cast<float>(q[c]);
     }
   });
   for (std::size_t l = 0; l < sources_.size(); ++l) {
@@ -148,10 +149,10 @@ void SceneRenderer::send_beams(const Body& body, Entering& light, std::stop_toke
 SceneRenderer::Entering SceneRenderer::entering(const Body& body, std::stop_token stop) {
   const auto& sky = body_sky_[&body - bodies_.data()];
   Entering light;
-  light.q.resize(body.body->subsurface().places().size());
+  light.environment.resize(body.body->subsurface().places().size());
   for (std::size_t i = 0; i < sky.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
-      light.q[i][c] = static_cast<float>(sky[i] * scene_.environment.radiance[c]);
+      light.environment[i][c] = static_cast<float>(sky[i] * scene_.environment.radiance[c]);
     }
   }
   if (scene_.diffusion.entry == Entry::kCollimated && body.body->subsurface().beams() != nullptr) {
@@ -162,7 +163,14 @@ SceneRenderer::Entering SceneRenderer::entering(const Body& body, std::stop_toke
   return light;
 }
 
-Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::stop_token stop) {
+bool SceneRenderer::is_provisional() const {
+  return std::ranges::any_of(bodies_,
+                             [](const Body& b) { return b.body->subsurface().is_provisional(); });
+}
+
+Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights,
+                                  Pace pace,
+                                  std::stop_token stop) {
   lights_ = lights;
   sources_.clear();
   for (const LightOptions& light : lights) {
@@ -178,12 +186,15 @@ Result<void> SceneRenderer::light(const std::vector<LightOptions>& lights, std::
       if (stop.stop_requested()) return cancelled("lighting");
     }
     const SpentTime watch(statistics_.solve_seconds);
-    const auto solved = body.body->subsurface().light(light.q, light.beams, stop);
+    Subsurface& solid = body.body->subsurface();
+    const auto solved = solid.light({light.environment, light.lamps, pace}, light.beams, stop);
     SceneStatistics::Object& object = statistics_.objects[body.object];
     if (!solved) return solved.error().in(fmt::format("object \"{}\"", object.name));
     object.iterations = solved->iterations;
     object.relative_residual = solved->relative_residual;
-    looks_[body.object].light = body.body->drawn().spread(body.body->subsurface().lit());
+    object.environment = solid.environment_entry();
+    object.lamps = solid.lamps_entry();
+    looks_[body.object].light = body.body->drawn().spread(solid.lit());
     looks_[body.object].mark_radiance = brightest(looks_[body.object]);
   }
   leave_out_dark();

@@ -26,6 +26,8 @@ struct SceneStatistics {
     Subsurface::Report body;    ///< of a translucent one
     int iterations = 0;         ///< of the last solution
     double relative_residual = 0.0;
+    DiffuseEntry environment = DiffuseEntry::kDark;  ///< how its light went in, last lighting
+    DiffuseEntry lamps = DiffuseEntry::kDark;        ///< where they are diffuse
   };
   std::vector<Object> objects;
   double load_seconds = 0.0;          ///< reading shapes and materials
@@ -60,8 +62,14 @@ class SceneRenderer {
                                                        const Step& step,
                                                        std::stop_token stop);
 
-  /// Lights the objects; the scene's own lights, or the same moved. Starts from the last lighting.
-  Result<void> light(const std::vector<LightOptions>& lights, std::stop_token stop);
+  /// Lights the objects; the scene's own lights, or the same moved. Starts from the last lighting. While things move, diffuse
+  /// light may go in as Subsurface::light() says.
+  Result<void> light(const std::vector<LightOptions>& lights, Pace pace, std::stop_token stop);
+  Result<void> light(const std::vector<LightOptions>& lights, std::stop_token stop) {
+    return light(lights, Pace::kAtRest, std::move(stop));
+  }
+  /// Whether lighting at rest would give another picture than the last lighting has.
+  bool is_provisional() const;
   /// The translucent object of that number, to be painted into, or none. Call light() afterwards.
   TranslucentBody* body(std::size_t object);
   /// Bends an object from its rest, translucent or opaque; answers how many tetrahedra are turned inside out (see
@@ -110,7 +118,8 @@ class SceneRenderer {
   void note_resolution(const ObjectOptions& object, const Subsurface::Report& report);
   Result<void> look_at_sky(std::stop_token stop);
   struct Entering {
-    std::vector<std::array<float, 3>> q;  ///< diffuse, of each of the body's places
+    std::vector<std::array<float, 3>> environment;  ///< of each of the body's places
+    std::vector<std::array<float, 3>> lamps;        ///< the same, where they are diffuse
     std::vector<Beam> beams;
   };
   Entering entering(const Body& body, std::stop_token stop);

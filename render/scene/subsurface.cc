@@ -19,9 +19,19 @@ namespace {
 using reconstruct::diffusion::SolveSummary;
 using reconstruct::diffusion::Termination;
 
+constexpr int kEnoughDirections = 4;   // of automatic ones, docs/rendering.md
 constexpr double kFarOff = 10.0;       // tolerances; a residual above that is no solution
 constexpr double kNormalStep = 0.02;   // of a place's size, for gradients of the distance
 constexpr double kBendingStep = 1e-3;  // of a place's size, for those of a deformation
+
+using Power = std::vector<std::array<double, 3>>;
+
+void add(Power& sums, const Power& more) {
+  sums.resize(more.size());
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    for (int c = 0; c < 3; ++c) sums[i][c] += more[i][c];
+  }
+}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -230,30 +240,62 @@ Result<std::size_t> Subsurface::bend(const Deformation& deformation) {
 
 void Subsurface::follow_anew() {
   if (beams_) beams_->update(mesh_.vertices, optics_);
-  diffuse_q_.clear();
+  environment_.is_stale = lamps_.is_stale = true;
 }
 
-const FirstScattering& Subsurface::diffuse(std::span<const std::array<float, 3>> q) {
-  if (diffuse_q_.size() == q.size() && std::ranges::equal(diffuse_q_, q)) return diffuse_;
-  diffuse_q_.assign(q.begin(), q.end());
-  diffuse_ = first_scattering(
-      *beams_, diffuse_beams(*beams_, on_faces(q), options_.directions), deposit_at(), *team_);
-  return diffuse_;
+/// Follows q to where it scatters first, unless that is known or has to wait. `as_before`: rather as it was than at the surface.
+DiffuseEntry Subsurface::enter(Followed& part,
+                               std::span<const std::array<float, 3>> q,
+                               bool as_before,
+                               Pace pace,
+                               const std::stop_token& stop) {
+  if (std::ranges::all_of(q, [](const auto& v) { return std::ranges::max(v) <= 0.0F; })) {
+    return DiffuseEntry::kDark;
+  }
+  if (!follows()) return DiffuseEntry::kAtSurface;
+  const bool is_same = std::ranges::equal(part.q, q);
+  if (is_same && !part.is_stale) return DiffuseEntry::kFollowed;
+  const bool is_automatic = options_.directions == DiffusionOptions::kAutomatic;
+  if (is_automatic && pace == Pace::kMoving) {
+    const bool is_near = is_same || (as_before && part.q.size() == q.size());
+    return is_near ? DiffuseEntry::kFollowedBefore : DiffuseEntry::kAtSurface;
+  }
+  const int directions = is_automatic ? kEnoughDirections : options_.directions;
+  part.q.clear();
+  part.light = first_scattering(
+      *beams_, diffuse_beams(*beams_, on_faces(q), directions), deposit_at(), *team_, stop);
+  if (stop.stop_requested()) return DiffuseEntry::kDark;
+  part.q.assign(q.begin(), q.end());
+  part.is_stale = false;
+  return DiffuseEntry::kFollowed;
 }
 
-Result<SolveSummary> Subsurface::light(std::span<const std::array<float, 3>> q,
+Result<SolveSummary> Subsurface::light(const DiffuseLight& diffuse,
                                        std::span<const Beam> beams,
                                        std::stop_token stop) {
-  std::vector<std::array<double, 3>> scattered;
-  if (!beams.empty()) scattered = first_scattering(*beams_, beams, deposit_at(), *team_).scattered;
-  const Values dark(follows_diffuse() ? q.size() : 0);
-  if (follows_diffuse()) {
-    const auto& more = diffuse(q).scattered;
-    if (scattered.empty()) scattered.resize(more.size());
-    for (std::size_t i = 0; i < more.size(); ++i) {
-      for (int c = 0; c < 3; ++c) scattered[i][c] += more[i][c];
+  Power scattered;
+  if (!beams.empty()) {
+    scattered = first_scattering(*beams_, beams, deposit_at(), *team_, stop).scattered;
+  }
+  environment_.entry = enter(environment_, diffuse.environment, true, diffuse.pace, stop);
+  lamps_.entry = enter(lamps_, diffuse.lamps, false, diffuse.pace, stop);
+  if (stop.stop_requested()) return cancelled("following the light");
+  Values q(places_.size());
+  Power passed;
+  is_provisional_ = false;
+  for (const auto& [part, light] :
+       {std::pair{&environment_, diffuse.environment}, {&lamps_, diffuse.lamps}}) {
+    if (part->entry == DiffuseEntry::kDark) continue;
+    if (part->entry == DiffuseEntry::kAtSurface) {
+      for (std::size_t i = 0; i < q.size(); ++i) {
+        for (int c = 0; c < 3; ++c) q[i][c] += light[i][c];
+      }
+      is_provisional_ = is_provisional_ || follows();
+      continue;
     }
-    q = dark;
+    is_provisional_ = is_provisional_ || part->entry == DiffuseEntry::kFollowedBefore;
+    add(scattered, part->light.scattered);
+    add(passed, part->light.passed);
   }
   const SolveSummary summary = solve(q, scattered, stop);
   if (summary.termination == Termination::kCancelled) return cancelled("solving for the light");
@@ -264,7 +306,7 @@ Result<SolveSummary> Subsurface::light(std::span<const std::array<float, 3>> q,
                     summary.message));
   }
   lit_ = at_surface(q);
-  if (follows_diffuse()) show_passed(diffuse_.passed);
+  if (!passed.empty()) show_passed(passed);
   return summary;
 }
 

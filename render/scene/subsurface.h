@@ -22,6 +22,21 @@ namespace opaline::render {
 
 struct SubsurfaceSetting;
 
+/// Light that is transmitted into the surface and diffuse behind it, W/mm^2, one value a place; none: it is dark.
+struct DiffuseLight {
+  std::span<const std::array<float, 3>> environment;
+  std::span<const std::array<float, 3>> lamps;
+  Pace pace = Pace::kAtRest;
+};
+
+/// How diffuse light went in.
+enum class DiffuseEntry : std::uint8_t {
+  kDark,
+  kAtSurface,
+  kFollowed,        ///< to where it scatters first
+  kFollowedBefore,  ///< the same, in the material and the shape before they last changed
+};
+
 /// A solid in which light diffuses: cut up, its coefficients taken at each node, ready to be lit again and again, each
 /// solution started from the one before.
 ///
@@ -87,13 +102,25 @@ class Subsurface {
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
   /// What beams enter through; none on a polygrid, which has no tetrahedra to follow them in.
   const BeamDeposit* beams() const { return beams_.get(); }
-  /// Solves for light q, W/mm^2 transmitted into the surface and diffuse behind it, one value a place, and for beams. Where
-  /// the options have directions, q is followed along them to where it scatters first (docs/physics.md), and what of it leaves
-  /// unscattered is in lit(), as if it left diffusely; of beams it is not.
+  /// Solves for diffuse light and for beams. Where the options have directions, diffuse light is followed along them to where
+  /// it scatters first (docs/physics.md), once while light, material and shape stay; what of it leaves unscattered is in lit(),
+  /// as if it left diffusely; of beams it is not. With automatic directions nothing is followed anew while things move: the
+  /// environment goes in as it was last followed, and so do lamps that have not moved; lamps that have enter at the surface.
   /// Errors: kCancelled; kInternal where the solution did not get below ten times the tolerance.
-  Result<reconstruct::diffusion::SolveSummary> light(std::span<const std::array<float, 3>> q,
+  Result<reconstruct::diffusion::SolveSummary> light(const DiffuseLight& diffuse,
                                                      std::span<const Beam> beams,
                                                      std::stop_token stop);
+  /// The same at rest for light q of an environment.
+  Result<reconstruct::diffusion::SolveSummary> light(std::span<const std::array<float, 3>> q,
+                                                     std::span<const Beam> beams,
+                                                     std::stop_token stop) {
+    return light({.environment = q, .lamps = {}}, beams, std::move(stop));
+  }
+  /// How the last solution's diffuse light went in.
+  DiffuseEntry environment_entry() const { return environment_.entry; }
+  DiffuseEntry lamps_entry() const { return lamps_.entry; }
+  /// Whether light() at rest would follow what the last solution has not.
+  bool is_provisional() const { return is_provisional_; }
   /// Of the last solution, one value a vertex of surface().
   const SurfaceLight& lit() const { return lit_; }
 
@@ -133,9 +160,18 @@ class Subsurface {
   std::vector<Optics> optics_;
 
  private:
-  bool follows_diffuse() const { return options_.directions > 0 && beams_; }
-  /// Follows q to where it scatters first, unless that is known.
-  const FirstScattering& diffuse(std::span<const std::array<float, 3>> q);
+  struct Followed {
+    DiffuseEntry entry = DiffuseEntry::kDark;
+    Values q;  // what `light` is of; empty: nothing was followed
+    FirstScattering light;
+    bool is_stale = false;  // material or shape have changed
+  };
+  bool follows() const { return options_.directions != 0 && beams_; }
+  DiffuseEntry enter(Followed& part,
+                     std::span<const std::array<float, 3>> q,
+                     bool as_before,
+                     Pace pace,
+                     const std::stop_token& stop);
   void show_passed(const std::vector<std::array<double, 3>>& passed);
 
   void sample(const MaterialAt& material);
@@ -154,8 +190,9 @@ class Subsurface {
   SurfaceLight lit_;
   std::unique_ptr<BeamDeposit> beams_;
   double two_a_ = 2.0;  // of the boundary condition
-  Values diffuse_q_;    // what diffuse_ is of; empty: of another solid or material
-  FirstScattering diffuse_;
+  Followed environment_;
+  Followed lamps_;
+  bool is_provisional_ = false;
 };
 
 }  // namespace opaline::render

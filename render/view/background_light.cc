@@ -6,12 +6,12 @@
 
 namespace opaline::render {
 
-void BackgroundLight::start(SceneRenderer& scene, std::vector<LightOptions> lights) {
+void BackgroundLight::start(SceneRenderer& scene, std::vector<LightOptions> lights, Pace pace) {
   ENSURE(!busy());
   done_ = false;
   problem_.reset();
-  thread_ = std::jthread([this, &scene, own = std::move(lights)](std::stop_token stop) {
-    if (auto lit = scene.light(own, std::move(stop)); !lit) problem_ = lit.error();
+  thread_ = std::jthread([this, &scene, pace, own = std::move(lights)](std::stop_token stop) {
+    if (auto lit = scene.light(own, pace, std::move(stop)); !lit) problem_ = lit.error();
     done_ = true;
   });
 }

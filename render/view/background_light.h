@@ -22,7 +22,7 @@ class BackgroundLight {
   bool busy() const { return thread_.joinable(); }
   bool ready() const { return busy() && done_; }
   /// Needs to be idle.
-  void start(SceneRenderer& scene, std::vector<LightOptions> lights);
+  void start(SceneRenderer& scene, std::vector<LightOptions> lights, Pace pace);
   /// Waits for the light. Errors: those of SceneRenderer::light().
   Result<void> take();
   /// Stops it and waits for that: about as long as one iteration of the solver takes. True: there was something to stop.

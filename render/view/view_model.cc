@@ -240,7 +240,7 @@ void ViewModel::has_light() {
 
 Result<void> ViewModel::light(std::stop_token stop) {
   hold();
-  if (!dark_) return ok();
+  if (!dark_ && !renderer_->is_provisional()) return ok();
   if (auto lit = renderer_->light(lights_, std::move(stop)); !lit) return lit;
   dark_ = false;
   has_light();
@@ -311,9 +311,9 @@ Result<Image<std::uint8_t>> ViewModel::picture_now(int width,
   if (auto caught = catch_up(); !caught) return caught.error();
   if (lose_next_ || !raster_) hold();
   auto drawn = draw_or_reopen(width, height, stops, std::move(stop));
-  if (drawn && dark_ && !background_.busy()) {
+  if (drawn && !background_.busy() && (dark_ || renderer_->is_provisional())) {
+    background_.start(*renderer_, lights_, dark_ ? Pace::kMoving : Pace::kAtRest);
     dark_ = false;
-    background_.start(*renderer_, lights_);
   }
   return drawn;
 }

@@ -62,8 +62,8 @@ class ViewModel {
 
   /// The picture as a screen shows it, its light found first. `stops` of exposure above the scene's own.
   Result<Image<std::uint8_t>> picture(int width, int height, double stops, std::stop_token stop);
-  /// The picture by the light there is, at once; whatever changed is lit behind it, and version() rises when that is done. The
-  /// very first picture waits for its light.
+  /// The picture by the light there is, at once; whatever changed is lit behind it, and version() rises when that is done; once more
+  /// where diffuse light is to be followed when nothing changes any more. The very first picture waits for its light.
   Result<Image<std::uint8_t>> picture_now(int width,
                                           int height,
                                           double stops,

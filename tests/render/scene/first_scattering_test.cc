@@ -90,7 +90,7 @@ TEST(FirstScattering, ABallLetsPassWhatItsChordsSay) {
   const BeamDeposit deposit(ball.mesh(), std::vector(ball.mesh().tets.size(), ball.optics()), 1.0);
   const std::vector<std::array<float, 3>> even(deposit.faces().size(), {1.0F, 0.0F, 0.0F});
   const auto found =
-      first_scattering(deposit, diffuse_beams(deposit, even, 4), DepositAt::kTetrahedra, team);
+      first_scattering(deposit, diffuse_beams(deposit, even, 4), DepositAt::kTetrahedra, team, {});
   double entered = 0.0;
   for (const auto& face : deposit.faces()) entered += face.area;
   std::array<double, 3> passed{};

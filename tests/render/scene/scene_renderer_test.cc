@@ -115,6 +115,7 @@ TEST(SceneRenderer, ASphereUnderADirectionalLightShowsTheExactRadiance) {
     Scene scene = scene_of({sphere()});
     scene.diffusion.method = method;
     scene.diffusion.entry = Entry::kDiffuse;
+    scene.diffusion.directions = 0;
     scene.lights = {sun({-1.0, 0.0, -0.5})};
     const Vec3 axis = normalized({1.0, 0.0, 0.5});
     const auto q = [](double cosine) { return std::max(0.0, cosine) * transmitted(cosine, kIor); };
@@ -126,6 +127,7 @@ TEST(SceneRenderer, ASphereUnderADirectionalLightShowsTheExactRadiance) {
 TEST(SceneRenderer, ASphereInAnEnvironmentShowsTheExactRadiance) {
   Scene scene = scene_of({sphere()});
   scene.environment = {.radiance = {2.0, 2.0, 2.0}, .rays = 256};
+  scene.diffusion.directions = 0;
   double passed = 0.0;  // 2 int (1 - R) mu dmu
   for (int k = 0; k < 1000; ++k)
     passed += 2.0 * transmitted((k + 0.5) / 1000, kIor) * (k + 0.5) / 1e6;

@@ -62,7 +62,11 @@ TEST(Subsurface, ASphereWithACoreShinesAsItsClosedForm) {
           **solid,
           [&, inner = in, outer = out](Vec3 p) { return length(p) < 6.0 ? inner : outer; },
           1.3,
-          {.method = method, .tetrahedra = 13e3, .interior_growth = 0.0, .tolerance = 1e-6},
+          {.method = method,
+           .directions = 0,
+           .tetrahedra = 13e3,
+           .interior_growth = 0.0,
+           .tolerance = 1e-6},
           team,
           {});
       ASSERT_TRUE(body) << body.error().message;

@@ -98,7 +98,7 @@ class Body : public ::testing::Test {
 };
 
 double Body::error_against_a_mesh_of_the_bent_shape(double tetrahedra, Discretisation method) {
-  const DiffusionOptions diffusion{.method = method, .tetrahedra = tetrahedra};
+  const DiffusionOptions diffusion{.method = method, .directions = 0, .tetrahedra = tetrahedra};
   const auto body = made(torus(), diffusion);
   EXPECT_TRUE(body->bend(bow(5.0)));
   solve(*body);

@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <cmath>
+#include <optional>
+#include <thread>
 
 namespace opaline::render {
 namespace {
@@ -66,6 +69,36 @@ TEST_F(View, AWholeTurnOfTheCameraEndsWhereItBegan) {
   model_->pan(0.1, 0.2);
   model_->pan(-0.1, -0.2);
   EXPECT_LE(largest_difference(picture(), before), 2);
+}
+
+TEST_F(View, AStrokeIsLitAtOnceAndItsEnvironmentIsFollowedWhenNothingMoves) {
+  Scene scene = lit_ring();
+  scene.environment.radiance = {0.5, 0.5, 0.5};
+  auto made = ViewModel::create(scene, {}, team_, [](std::string_view, double) {}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  model_ = *std::move(made);
+  picture();
+  EditOptions brush;
+  brush.operation = EditOptions::Operation::kScale;
+  brush.value = {3.0, 3.0, 3.0};
+  ASSERT_TRUE(model_->paint_all(0, brush));
+  std::vector<DiffuseEntry> seen;
+  std::uint64_t version = 0;
+  std::optional<Image<std::uint8_t>> last;
+  for (bool goes_on = true; goes_on;) {
+    auto drawn = model_->picture_now(kWidth, kHeight, 0.0, {});
+    ASSERT_TRUE(drawn) << drawn.error().message;
+    last = *std::move(drawn);
+    const DiffuseEntry entry = model_->statistics().objects[0].environment;
+    if (version != model_->version()) seen.push_back(entry);
+    version = model_->version();
+    goes_on = model_->is_lighting();
+    if (goes_on) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_EQ(seen.back(), DiffuseEntry::kFollowed);
+  EXPECT_THAT(seen, ::testing::Contains(DiffuseEntry::kFollowedBefore));
+  model_->orbit(0.0, 0.0);
+  EXPECT_LE(largest_difference(picture(), *last), 2);
 }
 
 TEST_F(View, TheCameraStopsBeforeThePole) {
