@@ -33,6 +33,9 @@ SolveSummary summarise(Termination termination, int iterations, double relative_
 /// passes trust it, and before convergence is believed, it is replaced by b - K x in float64 (van der
 /// Vorst & Ye 2000, SIAM J. Sci. Comput. 22, section 3), so the solution reaches float64 accuracy.
 ///
+/// Where a last half-sweep is likely to bring the residual below the tolerance, it takes the place of an iteration
+/// (passes.finishing()); should it not, conjugate gradients begin anew from there.
+///
 /// b_norms: ||b||^2 of each right-hand side. A right-hand side of zero must start from x = 0.
 /// Returns kBreakdown when three replacements in a row bring no progress or a number stops being
 /// one.
@@ -53,8 +56,10 @@ SolveSummary conjugate_gradient(P& passes,
     const double recurred = worst_ratio(passes.update_norm(), b_norms);
     if (!std::isfinite(recurred)) return summarise(Termination::kBreakdown, iteration, recurred);
     restart = false;
-    if (recurred > std::max(options.tolerance, passes.trusted_fall() * replaced)) continue;
-    if (recurred <= options.tolerance) {
+    const double nearly = passes.finishing() * options.tolerance;
+    if (recurred > std::max(nearly, passes.trusted_fall() * replaced)) continue;
+    const bool finished = recurred <= nearly;
+    if (finished) {
       const double reached = worst_ratio(passes.true_norm(), b_norms);
       if (reached <= options.tolerance)
         return summarise(Termination::kConverged, iteration, reached);
@@ -62,7 +67,7 @@ SolveSummary conjugate_gradient(P& passes,
     const double actual = worst_ratio(passes.true_residual(), b_norms);
     stalls = actual > 0.5 * replaced ? stalls + 1 : 0;
     if (stalls == 3) return summarise(Termination::kBreakdown, iteration, actual);
-    restart = actual > 2.0 * recurred;
+    restart = finished || actual > 2.0 * recurred;
     replaced = actual;
   }
   const double actual = worst_ratio(passes.true_norm(), b_norms);

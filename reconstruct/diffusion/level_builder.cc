@@ -169,15 +169,19 @@ void add_row(const double* values, int count, int ratio, double factor, double* 
   if (count % 2 == 1) sums[count / 2] += factor * values[count - 1];
 }
 
-void add_to_parents(
-    const Level& fine, const double* values, Slab slab, const Level& coarse, double* sums) {
+void add_to_parents(const Level& fine,
+                    const double* values,
+                    double factor,
+                    Slab slab,
+                    const Level& coarse,
+                    double* sums) {
   const std::array<int, 3>& ratio = fine.ratio;
   for (int k = slab.begin; k < slab.end; ++k)
     for (int j = 0; j < fine.cells[1]; ++j)
       add_row(values + row_at(fine, j, k),
               fine.cells[0],
               ratio[0],
-              1.0 / kOvercorrection,
+              factor,
               sums + row_at(coarse, j / ratio[1], k / ratio[2]));
 }
 
@@ -290,7 +294,7 @@ void clear(const Level& coarse, Slab slab, std::vector<double>& values) {
 void coarsen_slab(Level& fine, const Parts& from, Slab slab, Level& coarse, Parts& parts) {
   const Slab cells = below(slab, fine);
   clear(coarse, slab, parts.sink);
-  add_to_parents(fine, from.sink.data(), cells, coarse, parts.sink.data());
+  add_to_parents(fine, from.sink.data(), 1.0, cells, coarse, parts.sink.data());
   for (int axis = 0; axis < 3; ++axis) {
     clear(coarse, slab, coarse.conductance[axis]);
     for (int side = 0; side < 2; ++side)
@@ -301,8 +305,12 @@ void coarsen_slab(Level& fine, const Parts& from, Slab slab, Level& coarse, Part
     if (fine.ratio[axis] == 2)
       coarsen_faces(fine, axis, cells, coarse);
     else
-      add_to_parents(
-          fine, fine.conductance[axis].data(), cells, coarse, coarse.conductance[axis].data());
+      add_to_parents(fine,
+                     fine.conductance[axis].data(),
+                     1.0 / kOvercorrection,
+                     cells,
+                     coarse,
+                     coarse.conductance[axis].data());
     coarsen_walls(fine, from, axis, cells, coarse, parts);
   }
 }

@@ -18,9 +18,10 @@ namespace opaline::reconstruct::diffusion {
 /// aggregates, divided by the distance of their centres in fine cells: exact where kappa is constant, and
 /// where it jumps within an aggregate better than the resistances in series (at a contrast of 1e4 it
 /// halves the iterations). At the surface half the aggregate's own link lies in series with the fine
-/// boundary. Absorption adds up. All of a coarser level is then divided by 1.1: its own
-/// matrix is too stiff for smooth errors, so corrections fall short, and a tenth more
+/// boundary. Absorption adds up. A coarser level's conductances and
+/// walls are then divided by 1.1: they are too stiff for smooth errors, so corrections fall short, and a tenth more
 /// leaves a quarter to a half of the residual after eight iterations (over-correction, Braess 1995, Computing 55).
+/// Absorption is not: its sum is what smooth errors meet.
 ///
 /// A fine cell f of aggregate I takes its correction from I and from the aggregates J_a that it
 /// touches, one along each coarsened axis a,

@@ -19,6 +19,9 @@ namespace opaline::reconstruct::diffusion {
 ///                       Returns ||r||^2 of every right-hand side, taken in float64.
 ///                       Where x was zero, x may be left for true_norm() to complete, as long as r is of what it will be.
 /// true_norm()           the same, but r need not be kept: true_residual() comes before anything that reads it.
+///                       After a step it may finish x with one more half-sweep on r first.
+/// finishing()           by how much ||r|| may exceed the tolerance for true_norm() to be tried: 1 where it does not
+///                       finish x.
 /// trusted_fall()        how far ||r|| may fall from one true_residual() to the next: 1e-5 where d is rounded to
 ///                       single precision and r not told.
 /// smooth_restrict(l)    for l < levels() - 1: one red-black Gauss-Seidel sweep on K z = r from z =
@@ -59,6 +62,7 @@ concept DiffusionPasses = requires(P passes, int level, bool restart) {
   { passes.levels() } -> std::convertible_to<int>;
   { passes.true_residual() } -> std::convertible_to<std::span<const double>>;
   { passes.true_norm() } -> std::convertible_to<std::span<const double>>;
+  { passes.finishing() } -> std::convertible_to<double>;
   { passes.trusted_fall() } -> std::convertible_to<double>;
   passes.smooth_restrict(level);
   passes.prolong_smooth(level);

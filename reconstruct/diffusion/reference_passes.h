@@ -17,6 +17,7 @@ class ReferencePasses {
   int levels() const { return static_cast<int>(levels_.size()); }
   std::span<const double> true_residual();
   std::span<const double> true_norm() { return true_residual(); }
+  double finishing() const { return 1.0; }
   double trusted_fall() const { return 1e-5; }
   void smooth_restrict(int level);
   void prolong_smooth(int level);

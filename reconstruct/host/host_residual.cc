@@ -18,6 +18,9 @@ std::span<const double> HostPasses<T, S>::residual_pass(bool keeps) {
   keeps_ = keeps;
   const int parts = work_.parts(0);
   std::fill(work_.norm_sums.begin(), work_.norm_sums.end(), 0.0);
+  finishes_ = !keeps && (moved_ || aside_);
+  if (finishes_)
+    for (int m = 0; m < width_; ++m) shrunk_[m] = static_cast<T>(1.0 / growth_[m]);
   dark_ = keeps && group_.x_is_zero && !moved_ && !aside_;
   if (dark_) {
     for_slabs(parts, grid_.nz, [&](Slab slab) { dark_slab(slab); });
@@ -67,7 +70,10 @@ void HostPasses<T, S>::residual_slab(Slab slab) {
     const Rows red{std::max(0, y - 1), last ? grid_.ny : moved.end - 1};
     const Rows seen{std::max(0, y - 2), last ? grid_.ny : moved.end - 2};
     for (int z = slab.begin; z < slab.end + 2; ++z) {
-      if ((aside_ || moved_) && z < slab.end) add_correction(moved, z, slab.thread);
+      if ((aside_ || moved_) && z < slab.end) {
+        if (finishes_) finish_rows(moved, z);
+        add_correction(moved, z, slab.thread);
+      }
       if (slab.has(z - 1) && !relaxes_late(slab, z - 1)) relax_lines(red, z - 1);
       if (slab.has(z - 2) && !answers_late(slab, z - 2)) residual_rows(seen, z - 2, slab.thread);
     }
@@ -89,6 +95,22 @@ void HostPasses<T, S>::residual_ends(Slab slab) {
 }
 
 template <class T, class S>
+void HostPasses<T, S>::finish_rows(Rows rows, int z) {
+  const HostLevel<T>& level = grid_.levels[0];
+  for (int y = rows.begin; y < rows.end; ++y) {
+    const auto [j, k] = grid_.row_of(y, z);
+    T* d = work_.d.row(j, k);
+    kernels_.finish(d,
+                    moved_ ? d : nullptr,
+                    work_.r[0].row(j, k),
+                    level.inverse + level.row(j, k),
+                    shrunk_.data(),
+                    first_of(kBlack, j, k),
+                    level.nx);
+  }
+}
+
+template <class T, class S>
 void HostPasses<T, S>::add_correction(Rows rows, int z, int thread) {
   const std::size_t line = padded(half_line(grid_.nx));
   const std::size_t field = line * rows.count();
@@ -102,7 +124,7 @@ void HostPasses<T, S>::add_correction(Rows rows, int z, int thread) {
   };
   T* fields = work_.fields[thread].data();
   const T* first = spread(aside_, work_.aside, fields);
-  const T* second = spread(moved_, work_.d, fields + field * width_);
+  const T* second = spread(moved_ || finishes_, work_.d, fields + field * width_);
   for (int m = 0; m < group_.count; ++m) {
     if (scale_[m] == 0.0) continue;
     double* x = group_.x.field(group_.first + m) + grid_.cell(rows.begin, z);

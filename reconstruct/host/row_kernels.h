@@ -133,6 +133,9 @@ struct RowKernels {
                  double* sum,
                  int first,
                  int nx);
+  /// d = d_before + shrink r / D, of every other cell; d and r packed. A null d_before is zero.
+  void (*finish)(
+      T* d, const T* d_before, const T* r, const T* inverse, const T* shrink, int first, int nx);
 };
 
 /// Width 1, 4, 8 or 16, for the best instruction set of this processor. T and S: float and float,

@@ -57,7 +57,6 @@ void main() {
   after /= kOvercorrection;
   near /= kOvercorrection;
   far /= kOvercorrection;
-  sink /= kOvercorrection;
   coarse_walls[t] = sink;
   for (int axis = 0; axis < 3; ++axis) {
     if (own[axis] == 0) coarse_walls[wall_at(push.coarse, axis, 0, own)] = near[axis];

@@ -34,6 +34,7 @@ class VulkanPasses {
   int levels() const { return cycle_.levels(); }
   std::span<const double> true_residual();
   std::span<const double> true_norm() { return true_residual(); }
+  double finishing() const { return 1.0; }
   double trusted_fall() const { return 1e-5; }
   void smooth_restrict(int level) { cycle_.smooth_restrict(level); }
   void prolong_smooth(int level) { cycle_.prolong_smooth(level); }
