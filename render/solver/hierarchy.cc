@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/solver/large_pages.h"
+#include "render/solver/past_caches.h"
 
 namespace opaline::render {
 namespace {
@@ -19,7 +20,10 @@ void over_rows(int rows, ThreadTeam& team, const Work& work) {
     work(RowRange{0, rows});
     return;
   }
-  team.run([&](int thread) { work(share_of(rows, thread, team.size())); });
+  team.run([&](int thread) {
+    work(share_of(rows, thread, team.size()));
+    finish_writing();
+  });
 }
 
 template <class T>
@@ -104,7 +108,8 @@ struct Hierarchy<T>::Level {
   void first_step(const std::vector<Lanes<T>>& right, ThreadTeam& team) {
     const auto take = static_cast<T>(factors.take[0]);
     over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
-      for (int i = range.first; i < range.last; ++i) x[i] = inverse[i] * right[i] * take;
+      const FieldWriter<T> first(x.data(), x.size());
+      for (int i = range.first; i < range.last; ++i) first.put(i, inverse[i] * right[i] * take);
       if (d.empty()) return;
       for (int i = range.first; i < range.last; ++i) d[i] = x[i];
     });
@@ -120,10 +125,11 @@ struct Hierarchy<T>::Level {
     const auto keep = static_cast<T>(factors.keep[k]);
     const auto take = static_cast<T>(factors.take[k]);
     over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
+      const FieldWriter<T> after(out.data(), out.size());
       for (int i = range.first; i < range.last; ++i) {
         Lanes<T> move = inverse[i] * (right[i] - row(x.data(), i)) * take;
         if (!d.empty()) move = d[i] = k > 0 ? d[i] * keep + move : move;
-        out[i] = x[i] + move;
+        after.put(i, x[i] + move);
       }
     });
   }
@@ -131,7 +137,8 @@ struct Hierarchy<T>::Level {
   template <class Row>
   void residual(const std::vector<Lanes<T>>& right, const Row& row, ThreadTeam& team) {
     over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
-      for (int i = range.first; i < range.last; ++i) next[i] = right[i] - row(x.data(), i);
+      const FieldWriter<T> left(next.data(), next.size());
+      for (int i = range.first; i < range.last; ++i) left.put(i, right[i] - row(x.data(), i));
     });
   }
 

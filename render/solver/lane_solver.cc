@@ -9,6 +9,7 @@
 #include "base/ensure.h"
 #include "base/flush_denormals.h"
 #include "render/solver/large_pages.h"
+#include "render/solver/past_caches.h"
 
 namespace opaline::render {
 namespace {
@@ -68,6 +69,7 @@ Lanes<T> LaneSolver<T>::sum_over_rows(const Work& work) {
       for (int i = first; i < last; ++i) part += work(i);
       for (int lane = 0; lane < kLanes; ++lane) sum[lane] += static_cast<double>(part[lane]);
     }
+    finish_writing();
     sums[thread] = sum;
   });
   Lanes<T> total = Lanes<T>::zero();
@@ -94,16 +96,26 @@ Lanes<T> LaneSolver<T>::dot(const std::vector<Lanes<T>>& a, const std::vector<La
 
 template <class T>
 Lanes<T> LaneSolver<T>::apply_dot() {
+  const FieldWriter<T> q(q_.data(), q_.size());
   return sum_over_rows([&](int i) {
-    q_[i] = apply_row(matrix_, p_.data(), i);
-    return p_[i] * q_[i];
+    const Lanes<T> product = apply_row(matrix_, p_.data(), i);
+    q.put(i, product);
+    return p_[i] * product;
   });
 }
 
 template <class T>
-Lanes<T> LaneSolver<T>::advance(const Lanes<T>& alpha, std::vector<Lanes<T>>& x) {
-  return sum_over_rows([&](int i) {
+void LaneSolver<T>::turn(const Lanes<T>& alpha, const Lanes<T>& beta, std::vector<Lanes<T>>& x) {
+  sum_over_rows([&](int i) {
     x[i] += alpha * p_[i];
+    p_[i] = z_[i] + beta * p_[i];
+    return Lanes<T>::zero();
+  });
+}
+
+template <class T>
+Lanes<T> LaneSolver<T>::reduce(const Lanes<T>& alpha) {
+  return sum_over_rows([&](int i) {
     r_[i] -= alpha * q_[i];
     return r_[i] * r_[i];
   });
@@ -158,23 +170,24 @@ SolveSummary LaneSolver<T>::iterate(const Lanes<T>& b2,
                                     std::stop_token stop) {
   p_.assign(x.size(), Lanes<T>::zero());
   Lanes<T> rz = Lanes<T>::zero();
+  Lanes<T> alpha = Lanes<T>::zero();  // x still lacks alpha p
+  const auto ended = [&](Termination termination, double reached) {
+    turn(alpha, Lanes<T>::zero(), x);
+    return finished(termination, iteration, reached);
+  };
   for (double reached = 1e300; reached > options.tolerance; ++iteration) {
-    if (stop.stop_requested()) return finished(Termination::kCancelled, iteration, reached);
-    if (iteration == options.max_iterations)
-      return finished(Termination::kIterationLimit, iteration, reached);
+    if (stop.stop_requested()) return ended(Termination::kCancelled, reached);
+    if (iteration == options.max_iterations) return ended(Termination::kIterationLimit, reached);
     hierarchy_.precondition(matrix_, r_, z_, team_);
     const Lanes<T> rz_now = dot(r_, z_);
     const Lanes<T> beta = divide(rz_now, rz);
     rz = rz_now;
-    sum_over_rows([&](int i) {
-      p_[i] = z_[i] + beta * p_[i];
-      return Lanes<T>::zero();
-    });
-    const Lanes<T> alpha = divide(rz, apply_dot());
-    reached = relative(advance(alpha, x), b2);
-    if (!std::isfinite(reached)) return finished(Termination::kBreakdown, iteration, reached);
+    turn(alpha, beta, x);
+    alpha = divide(rz, apply_dot());
+    reached = relative(reduce(alpha), b2);
+    if (!std::isfinite(reached)) return ended(Termination::kBreakdown, reached);
   }
-  return finished(Termination::kConverged, iteration, 0.0);
+  return ended(Termination::kConverged, 0.0);
 }
 
 template class LaneSolver<float>;

@@ -53,8 +53,10 @@ class LaneSolver {
                     const std::vector<Lanes<T>>& x);  // into r_; its squared norm
   Lanes<T> dot(const std::vector<Lanes<T>>& a, const std::vector<Lanes<T>>& b);
   Lanes<T> apply_dot();  // q = A p; p . q
-  Lanes<T> advance(const Lanes<T>& alpha,
-                   std::vector<Lanes<T>>& x);  // x, r; squared norm of r
+  void turn(const Lanes<T>& alpha,
+            const Lanes<T>& beta,
+            std::vector<Lanes<T>>& x);     // x += alpha p, then p = z + beta p
+  Lanes<T> reduce(const Lanes<T>& alpha);  // r -= alpha q; its squared norm
   reconstruct::diffusion::SolveSummary iterate(const Lanes<T>& b2,
                                                std::vector<Lanes<T>>& x,
                                                const reconstruct::diffusion::SolveOptions& options,
