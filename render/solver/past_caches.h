@@ -38,7 +38,7 @@ class FieldWriter {
   }
   static void stream(double* to, const Lanes<double>& value) {
     for (int r = 0; r < Lanes<double>::kRegisters; ++r) {
-      _mm_stream_pd(to + r * Lanes<double>::kWidth,
+      _mm_stream_pd(to + static_cast<std::ptrdiff_t>(r) * Lanes<double>::kWidth,
                     reinterpret_cast<const __m128d&>(value.part[r]));
     }
   }
