@@ -4,6 +4,7 @@
 #include "render/graph/leaning_links.h"
 #include "render/graph/nearest.h"
 #include "render/graph/published_weights.h"
+#include "render/graph/surface_fit.h"
 #include "render/graph/two_point.h"
 #include "render/scene/fresh_hierarchy.h"
 #include "render/scene/subsurface_methods.h"
@@ -38,12 +39,6 @@ class GraphSubsurface final : public Subsurface {
     if (auto begun = begin(setting); !begun) return begun;
     solver_ =
         std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, setting.team);
-    if constexpr (kIsLattice) {
-      std::vector<Vec3> places;
-      for (const auto& node : graph_.surface) places.push_back(node.place);
-      to_vertices_ = nearest_interpolation(
-          places, surface().vertices, std::min<int>(kNearest, static_cast<int>(places.size())));
-    }
     return ok();
   }
 
@@ -64,15 +59,33 @@ class GraphSubsurface final : public Subsurface {
     for (const auto& node : graph_.surface) {
       places.push_back({node.place, node.normal, std::sqrt(2.0 * node.area)});
     }
+    if constexpr (!kIsLattice) add_vertices(places);
     return places;
+  }
+
+  void look_at_shape() override {
+    if constexpr (kIsLattice) {
+      std::vector<Vec3> places;
+      for (const auto& node : graph_.surface) places.push_back(node.place);
+      to_vertices_ = nearest_interpolation(
+          places, surface().vertices, std::min<int>(kNearest, static_cast<int>(places.size())));
+    } else {
+      to_vertices_ = fitted_interpolation(surface());
+    }
   }
 
   DepositAt deposit_at() const override { return DepositAt::kTetrahedra; }
 
+  Values on_faces(std::span<const std::array<float, 3>> q) const override {
+    const auto faces = q.first(graph_.surface.size());
+    return {faces.begin(), faces.end()};
+  }
+
   SolveSummary solve(std::span<const std::array<float, 3>> q,
                      std::span<const std::array<double, 3>> scattered,
                      std::stop_token stop) override {
-    diffusion_.load(q, load_);
+    const auto entering = q.first(graph_.surface.size());
+    diffusion_.load(entering, load_);
     for (std::size_t i = 0; i < scattered.size(); ++i) {
       for (int c = 0; c < 3; ++c) {
         const double more = diffusion_.load_of_power(i) * scattered[i][c];
@@ -84,16 +97,18 @@ class GraphSubsurface final : public Subsurface {
       options.tolerance = tolerance;
       return solver_->solve(load, phi_, options, stop);
     };
-    return lean_ ? lean_->settle(q, load_, phi_, options_.tolerance, options_.corrections, solve)
+    return lean_ ? lean_->settle(
+                       entering, load_, phi_, options_.tolerance, options_.corrections, solve)
                  : solve(load_, options_.tolerance);
   }
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
-    const SurfaceLight light = light_of(q);
+    const SurfaceLight light = light_of(q.first(graph_.surface.size()));
     if constexpr (kIsLattice) {
-      return {interpolated(light.fluence), interpolated(light.net_flux)};
+      return {interpolated(to_vertices_, light.fluence),
+              interpolated(to_vertices_, light.net_flux)};
     } else {
-      return at_vertices(surface(), light);
+      return with_flux(interpolated(to_vertices_, light.fluence), q.subspan(graph_.surface.size()));
     }
   }
 
@@ -108,16 +123,29 @@ class GraphSubsurface final : public Subsurface {
     return diffusion_.surface_light(q, phi_);
   }
 
-  Values interpolated(const Values& of_nodes) const {
-    Values values(surface().vertices.size());
-    for (int v = 0; v < to_vertices_.rows(); ++v) {
-      for (int e = to_vertices_.starts[v]; e < to_vertices_.starts[v + 1]; ++e) {
-        for (int c = 0; c < 3; ++c) {
-          values[v][c] += to_vertices_.weights[e] * of_nodes[to_vertices_.columns[e]][c];
-        }
+  void add_vertices(std::vector<SurfacePlace>& places) const {
+    const TriangleMesh& mesh = surface();
+    const std::vector<Vec3> normals = vertex_normals(mesh);
+    std::vector<double> areas(mesh.vertices.size());
+    for (std::size_t s = 0; s < graph_.surface.size(); ++s)
+      for (const int v : mesh.triangles[s]) areas[v] += graph_.surface[s].area / 3.0;
+    for (std::size_t v = 0; v < areas.size(); ++v)
+      places.push_back({mesh.vertices[v], normals[v], std::sqrt(areas[v])});
+  }
+
+  /// J_n = (phi - S) / (2 A) of the vertices, from the light there: the fluence hardly bends where the light does, and their
+  /// difference may. Fluence is not let below 0, where a fit may be beside a shadow's edge.
+  SurfaceLight with_flux(Values fluence, std::span<const std::array<float, 3>> q) const {
+    SurfaceLight light{std::move(fluence), Values(q.size())};
+    for (std::size_t v = 0; v < q.size(); ++v) {
+      for (int c = 0; c < 3; ++c) {
+        float& phi = light.fluence[v][c];
+        phi = std::max(phi, 0.0F);
+        const double source = boundary_.source_scale * q[v][c];
+        light.net_flux[v][c] = static_cast<float>((phi - source) / (2.0 * boundary_.a));
       }
     }
-    return values;
+    return light;
   }
 
   Graph graph_;

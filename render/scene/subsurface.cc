@@ -173,6 +173,7 @@ Result<void> Subsurface::begin(const SubsurfaceSetting& setting) {
   sample(setting.material);
   if (auto taken = assemble(); !taken) return taken;
   edges_ = edges_between();
+  look_at_shape();
   rest_places_ = flat_places();
   for (SurfacePlace& p : rest_places_) p.normal = smooth_normal(solid, p.place, p.normal, p.size);
   places_ = rest_places_;
@@ -229,6 +230,7 @@ Result<std::size_t> Subsurface::bend(const Deformation& deformation) {
   for (std::size_t v = 0; v < used_.size(); ++v) surface_.vertices[v] = mesh_.vertices[used_[v]];
   if (auto taken = assemble(); !taken) return taken.error();
   follow_anew();
+  look_at_shape();
   places_ = flat_places();
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const SurfacePlace& rest = rest_places_[i];

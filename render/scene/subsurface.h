@@ -96,7 +96,8 @@ class Subsurface {
 
   const TriangleMesh& surface() const { return surface_; }
   const Report& report() const { return report_; }
-  /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges().
+  /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges(). Of a graph: the middles of its
+  /// triangles, then its vertices.
   const std::vector<SurfacePlace>& places() const { return places_; }
   /// Of elements the edges of surface(), by its vertices; else none.
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
@@ -146,6 +147,8 @@ class Subsurface {
       std::span<const std::array<float, 3>> q,
       std::span<const std::array<double, 3>> scattered,
       std::stop_token stop) = 0;
+  /// The surface has another shape than before, or its first.
+  virtual void look_at_shape() {}
   virtual SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const = 0;
 
   reconstruct::diffusion::SolveOptions solve_options() const {
