@@ -7,11 +7,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "base/files.h"
 #include "bench/figure.h"
+#include "bench/front.h"
 #include "bench/led/stage_case.h"
 #include "bench/stopwatch.h"
-#include "daemon/report/plot.h"
 #include "reconstruct/diffusion/fresnel.h"
 #include "reconstruct/spherical_gradient/curvature_ratio.h"
 #include "reconstruct/spherical_gradient/window_fit.h"
@@ -23,13 +22,6 @@ using reconstruct::CurvatureRatio;
 using reconstruct::StagePictures;
 
 constexpr double kIor = 1.4;
-
-struct Point {
-  std::string name;
-  int lamps = 0;
-  double seconds = 0.0;
-  double error = 0.0;
-};
 
 /// How D is had from a window's reflectance, ratio and curvature.
 enum class Formula : std::uint8_t { kDipole, kPublished };
@@ -84,57 +76,11 @@ double formula_error(const StageCase& stage,
   return std::sqrt(sum / std::max(1.0, count));
 }
 
-/// Those that no other beats in both.
-std::vector<Point> front_of(std::vector<Point> points) {
-  std::ranges::sort(points, {}, &Point::seconds);
-  std::vector<Point> front;
-  for (const Point& point : points)
-    if (front.empty() || point.error < front.back().error) front.push_back(point);
-  return front;
-}
-
-int draw_front(const std::vector<Point>& points,
-               const std::vector<Point>& front,
-               const std::string& file) {
-  daemon::CurvePlot plot;
-  plot.x_label = "capture and computing, s";
-  plot.y_label = "error of D, %";
-  plot.log_x = plot.log_y = true;
-  plot.height = 420;
-  const auto series = [&](const std::string& title, const std::string& color, auto wanted) {
-    daemon::Series s{title, color, {}, {}, daemon::SeriesStyle::kPoints};
-    for (const Point& point : points) {
-      if (!wanted(point)) continue;
-      s.x.push_back(point.seconds);
-      s.y.push_back(100.0 * point.error);
-    }
-    plot.series.push_back(std::move(s));
-  };
-  const auto is_table = [](const Point& p) { return p.name.ends_with("table"); };
-  series("346 lamps", "#1e8449", [&](const Point& p) { return p.lamps == 346 && is_table(p); });
-  series("156 lamps", "#2471a3", [&](const Point& p) { return p.lamps == 156 && is_table(p); });
-  series("60 lamps", "#b9770e", [&](const Point& p) { return p.lamps == 60 && is_table(p); });
-  series("formulas", "#c0392b", [&](const Point& p) { return !is_table(p); });
-  daemon::Series line{"front", "#555555", {}, {}, daemon::SeriesStyle::kLine};
-  for (const Point& point : front) {
-    line.x.push_back(point.seconds);
-    line.y.push_back(100.0 * point.error);
-  }
-  plot.series.push_back(std::move(line));
-  const auto svg = daemon::draw(plot, "front", {});
-  const auto written =
-      svg ? write_whole(system_files(), file, daemon::svg_file({*svg}, plot.width, plot.height))
-          : Result<void>(svg.error());
-  if (written) return 0;
-  std::fputs((written.error().message + "\n").c_str(), stderr);
-  return 1;
-}
-
 }  // namespace
 
 int measure_tradeoff(std::int64_t paths, const std::string& plot, ThreadTeam& team) {
-  std::vector<Point> points;
-  const auto add = [&](Point point) {
+  std::vector<FrontPoint> points;
+  const auto add = [&](FrontPoint point) {
     print_figure("led.tradeoff_error", point.name, point.error, "1");
     print_figure("led.tradeoff_seconds", point.name, point.seconds, "s");
     points.push_back(std::move(point));
@@ -156,7 +102,7 @@ int measure_tradeoff(std::int64_t paths, const std::string& plot, ThreadTeam& te
         const auto maps = stage.estimate(pictures, shot, team);
         const double seconds = capture + watch.seconds();
         add({fmt::format("{}, window {}, table", with, window),
-             lamps,
+             fmt::format("{} lamps", lamps),
              seconds,
              stage.errors(pictures, maps).error});
       }
@@ -165,15 +111,19 @@ int measure_tradeoff(std::int64_t paths, const std::string& plot, ThreadTeam& te
         const Stopwatch watch;
         const double error = formula_error(stage, pictures, 16, formula, team);
         add({fmt::format("{}, window 16, {}", with, name),
-             lamps,
+             "formulas",
              capture + watch.seconds(),
              error});
       }
     }
   }
-  const std::vector<Point> front = front_of(points);
-  for (const Point& point : front) print_figure("led.tradeoff_front", point.name, point.error, "1");
-  return plot.empty() ? 0 : draw_front(points, front, plot);
+  for (const FrontPoint& point : front_of(points))
+    print_figure("led.tradeoff_front", point.name, point.error, "1");
+  if (plot.empty()) return 0;
+  const auto drawn = draw_front(points, "capture and computing, s", "error of D, %", plot);
+  if (drawn) return 0;
+  std::fputs((drawn.error().message + "\n").c_str(), stderr);
+  return 1;
 }
 
 }  // namespace opaline::bench

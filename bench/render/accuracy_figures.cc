@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "bench/figure.h"
@@ -20,30 +19,6 @@ namespace {
 using reconstruct::diffusion::BoundaryModel;
 
 constexpr int kThreads = 2;
-
-/// One method and size, and what each tolerance makes of it.
-void measure_dial(const std::string& which,
-                  const render::SignedDistance& solid,
-                  render::DiffusionOptions options,
-                  const LitMarble& reference,
-                  ThreadTeam& team) {
-  constexpr int kFrames = 9;
-  for (const auto& [tolerances, precision] :
-       {std::pair{std::vector{1e-1, 1e-2, 1e-3, 1e-4}, "single"}, {std::vector{1e-6}, "double"}}) {
-    options.tolerance = tolerances.back();
-    LitMarble marble(solid, options, team);
-    if (precision == std::string("single")) {
-      print_figure("render.dial_unknowns", which, static_cast<double>(marble.unknowns()), "1");
-    }
-    for (const double tolerance : tolerances) {
-      marble.set_tolerance(tolerance);
-      const double seconds = marble.frame_seconds(kFrames);
-      const std::string name = fmt::format("{}-{:.0e}", which, tolerance);
-      print_figure("render.dial_frame_seconds", name, seconds, "s");
-      print_figure("render.dial_error", name, marble.error_against(reference), "1");
-    }
-  }
-}
 
 /// The model's error by how thick the solid is.
 void print_bands(const std::string& which, const TransportError& error) {
@@ -135,38 +110,6 @@ void measure_geometry() {
     print_figure("render.error_vs_fem", which, coarse.error_against(reference), "1");
     print_figure("render.error_of_elements", which, coarse.error_against(same_facets), "1");
     print_figure("render.error_of_facets", which, same_facets.error_against(reference), "1");
-  }
-}
-
-void measure_dials() {
-  ThreadTeam team(1);
-  const auto solid = shape("torus");
-  const double volume = render::estimate_volume(*solid);
-  using enum render::Discretisation;
-  const LitMarble reference(*solid,
-                            {.method = kElements,
-                             .directions = 0,
-                             .spacing_mm = 0.5 * render::spacing_for(volume, 1.4e5),
-                             .interior_growth = 0.0,
-                             .tolerance = 1e-8},
-                            team);
-  for (const auto& [name, method, corrections] : {std::tuple{"elements", kElements, 0},
-                                                  {"graph", kGraph, 8},
-                                                  {"two_point", kGraph, 0},
-                                                  {"polygrid", kPolygrid, 0}}) {
-    for (const auto& [size, tets] : {std::pair{"30k", 3e4}, {"140k", 1.4e5}}) {
-      for (const auto& [k, growth] : {std::pair{"K0.1", 0.1}, {"K1", 1.0}}) {
-        measure_dial(fmt::format("{}-{}-{}", name, size, k),
-                     *solid,
-                     {.method = method,
-                      .directions = 0,
-                      .spacing_mm = render::spacing_for(volume, tets),
-                      .interior_growth = growth,
-                      .corrections = corrections},
-                     reference,
-                     team);
-      }
-    }
   }
 }
 

@@ -8,6 +8,5 @@ void measure_accuracy();
 void measure_geometry();
 void measure_transport();
 void measure_directions();
-void measure_dials();
 
 }  // namespace opaline::bench
