@@ -14,7 +14,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace opaline::reconstruct::host::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
 
 /// Cells between what is read and what is asked for: the processor does not foresee every other cell of a row.
 constexpr std::ptrdiff_t kAhead = 8;
