@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "render/solver/large_pages.h"
@@ -40,7 +41,8 @@ double largest_eigenvalue(const LaneMatrix<T>& a, const std::vector<Lanes<T>>& i
   std::vector<Lanes<T>> x(a.rows());
   std::vector<Lanes<T>> y(a.rows());
   for (int i = 0; i < a.rows(); ++i)
-    x[i] = Lanes<T>::all(static_cast<T>((i * 7919 % 101) / 50.0 - 1.0));
+    x[i] = Lanes<T>::all(
+        static_cast<T>(static_cast<double>(std::int64_t{i} * 7919 % 101) / 50.0 - 1.0));
   double largest = 0.0;
   for (int iteration = 0; iteration < 12; ++iteration) {
     Lanes<T> size = Lanes<T>::zero();
