@@ -40,7 +40,8 @@ int main(int argc, char** argv) try {
                "Only lamps, exposures, smoothing and estimator against error and time");
   app.add_flag("--blobs", blobs, "Only smooth blobs and dents");
   app.add_option("--body", body, "With --blobs: only this one");
-  app.add_option("--plot", plot, "With --tradeoff: an SVG file for the front");
+  app.add_option(
+      "--plot", plot, "With --tradeoff: an SVG file for the front, and a .csv beside it");
   CLI11_PARSE(app, argc, argv);
   opaline::ThreadTeam team(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
   if (tradeoff) return bench::measure_tradeoff(std::min<std::int64_t>(paths, 500'000), plot, team);

@@ -67,7 +67,7 @@ SolveSummary conjugate_gradient(P& passes,
     const double actual = worst_ratio(passes.true_residual(), b_norms);
     stalls = actual > 0.5 * replaced ? stalls + 1 : 0;
     if (stalls == 3) return summarise(Termination::kBreakdown, iteration, actual);
-    restart = finished || actual > 2.0 * recurred;
+    restart = (finished && passes.finishing() > 1.0) || actual > 2.0 * recurred;
     replaced = actual;
   }
   const double actual = worst_ratio(passes.true_norm(), b_norms);

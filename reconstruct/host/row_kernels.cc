@@ -1,7 +1,5 @@
 #include "reconstruct/host/row_kernels.h"
 
-#include <type_traits>
-
 // Only instruction sets of fixed width: the right-hand sides of a cell are arrays of registers.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | HWY_SSSE3)
 #undef HWY_TARGET_INCLUDE
