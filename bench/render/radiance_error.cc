@@ -25,6 +25,7 @@ using render::TriangleTree;
 constexpr double kIor = 1.3;
 constexpr Vec3 kTowards{0.6, 0.48, 0.64};
 constexpr double kStepDegrees = 2.0;
+constexpr double kNormalStep = 0.02;  // of an edge, for gradients of the distance
 using Colour = std::array<double, 3>;
 
 Colour radiance(const render::SurfaceLight& light, std::size_t v) {
@@ -70,6 +71,11 @@ class Middles {
   std::map<std::pair<int, int>, int> known_;
 };
 
+std::unique_ptr<render::Subsurface> made(Result<std::unique_ptr<render::Subsurface>> body) {
+  ENSURE(body.has_value());
+  return *std::move(body);
+}
+
 }  // namespace
 
 render::TetMesh cut_into_eight(const render::TetMesh& mesh) {
@@ -94,25 +100,28 @@ render::TetMesh cut_into_eight(const render::TetMesh& mesh) {
   return fine;
 }
 
-LitMarble::LitMarble(render::TetMesh mesh,
+LitMarble::LitMarble(std::unique_ptr<render::Subsurface> body,
                      const render::SignedDistance& solid,
-                     const render::DiffusionOptions& options,
-                     ThreadTeam& team) {
-  auto body =
-      render::Subsurface::create(std::move(mesh), solid, marbled_optics, kIor, options, team, {});
-  ENSURE(body.has_value());
-  body_ = *std::move(body);
+                     bool is_followed)
+    : solid_(&solid), is_followed_(is_followed), body_(std::move(body)) {
   light_from(0.0);
 }
 
+LitMarble::LitMarble(render::TetMesh mesh,
+                     const render::SignedDistance& solid,
+                     const render::DiffusionOptions& options,
+                     ThreadTeam& team)
+    : LitMarble(made(render::Subsurface::create(
+                    std::move(mesh), solid, marbled_optics, kIor, options, team, {})),
+                solid,
+                options.directions != 0) {}
+
 LitMarble::LitMarble(const render::SignedDistance& solid,
                      const render::DiffusionOptions& options,
-                     ThreadTeam& team) {
-  auto body = render::Subsurface::create(solid, marbled_optics, kIor, options, team, {});
-  ENSURE(body.has_value());
-  body_ = *std::move(body);
-  light_from(0.0);
-}
+                     ThreadTeam& team)
+    : LitMarble(made(render::Subsurface::create(solid, marbled_optics, kIor, options, team, {})),
+                solid,
+                options.directions != 0) {}
 
 double LitMarble::frame_seconds(int frames) {
   std::vector<double> seconds;
@@ -138,10 +147,32 @@ void LitMarble::light_from(double degrees) {
   ENSURE(solved.has_value());
 }
 
+Colour LitMarble::truth_at(const RayHit& hit) const {
+  static const auto boundary = render_boundary();
+  const auto& corners = body_->surface().triangles[hit.triangle];
+  Vec3 place{};
+  Colour fluence{};
+  Colour interpolated{};
+  for (int k = 0; k < 3; ++k) {
+    place = place + body_->surface().vertices[corners[k]] * hit.weights[k];
+    const Colour corner = radiance(body_->lit(), corners[k]);
+    for (int c = 0; c < 3; ++c) {
+      fluence[c] += hit.weights[k] * body_->lit().fluence[corners[k]][c];
+      interpolated[c] += hit.weights[k] * corner[c];
+    }
+  }
+  if (is_followed_) return interpolated;
+  const Vec3 normal = solid_->normal(place, kNormalStep * body_->report().spacing_mm);
+  const double source = boundary.source_scale * std::max(0.0, dot(normal, kTowards));
+  Colour radiance{};
+  for (int c = 0; c < 3; ++c)
+    radiance[c] = fluence[c] + 3.0 * (fluence[c] - source) / (2.0 * boundary.a);
+  return radiance;
+}
+
 double LitMarble::error_against(const LitMarble& reference) const {
   const TriangleMesh& mesh = body_->surface();
-  const TriangleMesh& other = reference.body_->surface();
-  const auto tree = TriangleTree::create(other);
+  const auto tree = TriangleTree::create(reference.body_->surface());
   ENSURE(tree.has_value());
   const auto normals = render::vertex_normals(mesh);
   const auto areas = vertex_areas(mesh);
@@ -151,11 +182,7 @@ double LitMarble::error_against(const LitMarble& reference) const {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto hit = nearest_along(*tree, mesh.vertices[v], normals[v], reach);
     if (!hit) continue;
-    Colour truth{};
-    for (int k = 0; k < 3; ++k) {
-      const Colour corner = radiance(reference.body_->lit(), other.triangles[hit->triangle][k]);
-      for (int c = 0; c < 3; ++c) truth[c] += hit->weights[k] * corner[c];
-    }
+    const Colour truth = reference.truth_at(*hit);
     const Colour own = radiance(body_->lit(), v);
     for (int c = 0; c < 3; ++c) {
       error += areas[v] * (own[c] - truth[c]) * (own[c] - truth[c]);
