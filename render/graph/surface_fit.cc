@@ -4,13 +4,19 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <vector>
+
+#include "render/graph/nearest.h"
 
 namespace opaline::render {
 namespace {
 
 constexpr int kTerms = 6;
-constexpr double kFaces = 0.3;      // cosine between a triangle's normal and the vertex's
+constexpr int kNearest = 48;        // samples that are not a mesh's triangles; about three rings
+constexpr int kFirstRing = 6;       // of those
+constexpr double kReach = 1.5;      // of the mean distance of the first ring
+constexpr double kFaces = 0.3;      // cosine between a sample's normal and the vertex's
 constexpr double kSingular = 1e-3;  // of a pivot, relative to its diagonal
 constexpr double kMostWeight =
     3.0;  // sum of |weights| beyond which values' errors would be amplified
@@ -18,8 +24,8 @@ constexpr double kMostWeight =
 using Terms = std::array<double, kTerms>;
 using Moments = std::array<Terms, kTerms>;
 
-struct Middle {
-  int triangle = 0;
+struct Near {
+  int sample = 0;
   double weight = 0.0;
   Terms terms{};
 };
@@ -49,10 +55,10 @@ std::optional<Terms> first_row_of_inverse(Moments m, int count) {
   return x;
 }
 
-/// Weights of the middles in the polynomial of `count` terms at the vertex.
-std::optional<std::vector<float>> weights_of(const std::vector<Middle>& middles, int count) {
+/// Weights of the samples in the polynomial of `count` terms at the vertex.
+std::optional<std::vector<float>> weights_of(const std::vector<Near>& near, int count) {
   Moments moments{};
-  for (const Middle& m : middles) {
+  for (const Near& m : near) {
     for (int i = 0; i < count; ++i) {
       for (int j = 0; j < count; ++j) moments[i][j] += m.weight * m.terms[i] * m.terms[j];
     }
@@ -61,7 +67,7 @@ std::optional<std::vector<float>> weights_of(const std::vector<Middle>& middles,
   if (!row) return std::nullopt;
   std::vector<float> weights;
   double all = 0.0;
-  for (const Middle& m : middles) {
+  for (const Near& m : near) {
     double sum = 0.0;
     for (int i = 0; i < count; ++i) sum += (*row)[i] * m.terms[i];
     weights.push_back(static_cast<float>(m.weight * sum));
@@ -71,35 +77,54 @@ std::optional<std::vector<float>> weights_of(const std::vector<Middle>& middles,
   return weights;
 }
 
-class Fit {
+/// Adds a row: the polynomial at a place of a surface, through these of the samples.
+void add_row(const std::vector<SurfaceSample>& samples,
+             std::span<const int> around,
+             Vec3 place,
+             Vec3 normal,
+             double reach,
+             Interpolation<float>& rows) {
+  const Vec3 u = normalized(std::abs(normal.x) < 0.6 ? cross(normal, {1.0, 0.0, 0.0})
+                                                     : cross(normal, {0.0, 1.0, 0.0}));
+  const Vec3 w = cross(normal, u);
+  std::vector<Near> near;
+  for (const int s : around) {
+    const double size = length(samples[s].area);
+    if (!(dot(samples[s].area, normal) > kFaces * size)) continue;
+    const Vec3 way = (samples[s].place - place) * (1.0 / reach);
+    const double x = dot(way, u);
+    const double y = dot(way, w);
+    near.push_back({s, size * std::exp(-dot(way, way)), {1.0, x, y, x * x, x * y, y * y}});
+  }
+  std::optional<std::vector<float>> weights;
+  for (const int count : {6, 3, 1}) {
+    if (!weights && std::ssize(near) >= count) weights = weights_of(near, count);
+  }
+  for (std::size_t n = 0; weights && n < near.size(); ++n) {
+    rows.columns.push_back(near[n].sample);
+    rows.weights.push_back((*weights)[n]);
+  }
+  rows.starts.push_back(static_cast<int>(rows.columns.size()));
+}
+
+/// The triangles of a mesh as samples, and which are around a vertex.
+class Rings {
  public:
-  explicit Fit(const TriangleMesh& surface) : surface_(surface), around_(surface.vertices.size()) {
+  explicit Rings(const TriangleMesh& surface)
+      : surface_(surface), around_(surface.vertices.size()) {
     for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
       const auto& [i, j, k] = surface.triangles[t];
       const Vec3 a = surface.vertices[i];
       const Vec3 b = surface.vertices[j];
       const Vec3 c = surface.vertices[k];
-      areas_.push_back(cross(b - a, c - a) * 0.5);
-      middles_.push_back((a + b + c) * (1.0 / 3.0));
+      samples_.push_back({(a + b + c) * (1.0 / 3.0), cross(b - a, c - a) * 0.5});
       for (const int v : {i, j, k}) around_[v].push_back(static_cast<int>(t));
     }
   }
 
-  void add_row(int vertex, Interpolation<float>& rows) const {
-    const std::vector<Middle> middles = middles_around(vertex);
-    std::optional<std::vector<float>> weights;
-    for (const int count : {6, 3, 1}) {
-      if (!weights && std::ssize(middles) >= count) weights = weights_of(middles, count);
-    }
-    for (std::size_t m = 0; weights && m < middles.size(); ++m) {
-      rows.columns.push_back(middles[m].triangle);
-      rows.weights.push_back((*weights)[m]);
-    }
-    rows.starts.push_back(static_cast<int>(rows.columns.size()));
-  }
+  const std::vector<SurfaceSample>& samples() const { return samples_; }
 
- private:
-  std::vector<int> triangles_around(int vertex) const {
+  std::vector<int> two_around(int vertex) const {
     std::vector<int> all;
     for (const int t : around_[vertex]) {
       for (const int v : surface_.triangles[t]) {
@@ -111,36 +136,31 @@ class Fit {
     return all;
   }
 
-  std::vector<Middle> middles_around(int vertex) const {
-    const Vec3 place = surface_.vertices[vertex];
+  /// The sum of the areas of a vertex's own triangles.
+  Vec3 area_at(int vertex) const {
     Vec3 area{};
-    double reach = 0.0;
-    for (const int t : around_[vertex]) {
-      area = area + areas_[t];
-      reach += length(middles_[t] - place) / static_cast<double>(around_[vertex].size());
-    }
-    if (!(length(area) > 0.0)) return {};
-    const Vec3 normal = normalized(area);
-    const Vec3 u = normalized(std::abs(normal.x) < 0.6 ? cross(normal, {1.0, 0.0, 0.0})
-                                                       : cross(normal, {0.0, 1.0, 0.0}));
-    const Vec3 w = cross(normal, u);
-    std::vector<Middle> found;
-    for (const int t : triangles_around(vertex)) {
-      const double size = length(areas_[t]);
-      if (!(dot(areas_[t], normal) > kFaces * size)) continue;
-      const Vec3 way = (middles_[t] - place) * (1.0 / reach);
-      const double x = dot(way, u);
-      const double y = dot(way, w);
-      found.push_back({t, size * std::exp(-dot(way, way)), {1.0, x, y, x * x, x * y, y * y}});
-    }
-    return found;
+    for (const int t : around_[vertex]) area = area + samples_[t].area;
+    return area;
   }
 
+  /// The mean distance to the middles of a vertex's own triangles.
+  double reach_of(int vertex) const {
+    double sum = 0.0;
+    for (const int t : around_[vertex]) {
+      sum += length(samples_[t].place - surface_.vertices[vertex]);
+    }
+    return sum / static_cast<double>(around_[vertex].size());
+  }
+
+ private:
   const TriangleMesh& surface_;
   std::vector<std::vector<int>> around_;  // triangles of each vertex
-  std::vector<Vec3> areas_;               // of triangles, along their normals
-  std::vector<Vec3> middles_;
+  std::vector<SurfaceSample> samples_;
 };
+
+void add_empty_row(Interpolation<float>& rows) {
+  rows.starts.push_back(static_cast<int>(rows.columns.size()));
+}
 
 }  // namespace
 
@@ -155,10 +175,47 @@ SurfaceValues interpolated(const Interpolation<float>& rows, const SurfaceValues
 }
 
 Interpolation<float> fitted_interpolation(const TriangleMesh& surface) {
-  const Fit fit(surface);
+  const Rings rings(surface);
   Interpolation<float> rows;
   rows.coarse_rows = static_cast<int>(surface.triangles.size());
-  for (std::size_t v = 0; v < surface.vertices.size(); ++v) fit.add_row(static_cast<int>(v), rows);
+  for (int v = 0; v < static_cast<int>(surface.vertices.size()); ++v) {
+    const Vec3 area = rings.area_at(v);
+    if (length(area) > 0.0) {
+      add_row(rings.samples(),
+              rings.two_around(v),
+              surface.vertices[v],
+              normalized(area),
+              rings.reach_of(v),
+              rows);
+    } else {
+      add_empty_row(rows);
+    }
+  }
+  return rows;
+}
+
+Interpolation<float> fitted_interpolation(const std::vector<SurfaceSample>& samples,
+                                          const TriangleMesh& surface) {
+  const Rings rings(surface);
+  std::vector<Vec3> places;
+  for (const SurfaceSample& sample : samples) places.push_back(sample.place);
+  const int count = std::min<int>(kNearest, static_cast<int>(places.size()));
+  const auto nearest = nearest_interpolation(places, surface.vertices, count);
+  Interpolation<float> rows;
+  rows.coarse_rows = static_cast<int>(samples.size());
+  for (int v = 0; v < static_cast<int>(surface.vertices.size()); ++v) {
+    const Vec3 place = surface.vertices[v];
+    const Vec3 area = rings.area_at(v);
+    const std::span<const int> around(nearest.columns.data() + nearest.starts[v], count);
+    double reach = 0.0;
+    const int own = std::min(kFirstRing, count);
+    for (const int s : around.first(own)) reach += kReach * length(places[s] - place) / own;
+    if (length(area) > 0.0 && reach > 0.0) {
+      add_row(samples, around, place, normalized(area), reach, rows);
+    } else {
+      add_empty_row(rows);
+    }
+  }
   return rows;
 }
 

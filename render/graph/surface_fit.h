@@ -25,6 +25,17 @@ namespace opaline::render {
 /// Rows: vertices; columns: triangles. The weights of a row add up to 1, and some are negative. Needs a valid mesh.
 Interpolation<float> fitted_interpolation(const TriangleMesh& surface);
 
+/// Where a value is known on a surface.
+struct SurfaceSample {
+  Vec3 place;
+  Vec3 area;  ///< that it stands for, along the surface's normal, mm^2
+};
+
+/// The same of samples that are no mesh's triangles, as a lattice's boundary nodes: through the 48 nearest of each vertex, r 1.5 times the
+/// mean of d over the nearest six, since values there scatter from node to node. Columns: samples; there must be some.
+Interpolation<float> fitted_interpolation(const std::vector<SurfaceSample>& samples,
+                                          const TriangleMesh& surface);
+
 using SurfaceValues = std::vector<std::array<float, 3>>;  ///< red, green, blue
 /// The values of rows' triangles at their vertices; 0 in an empty row.
 SurfaceValues interpolated(const Interpolation<float>& rows, const SurfaceValues& values);

@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "render/graph/leaning_links.h"
-#include "render/graph/nearest.h"
 #include "render/graph/published_weights.h"
 #include "render/graph/surface_fit.h"
 #include "render/graph/two_point.h"
@@ -17,7 +16,6 @@ namespace {
 using reconstruct::diffusion::Boundary;
 using reconstruct::diffusion::SolveSummary;
 
-constexpr int kNearest = 4;
 constexpr double kSinglePrecision = 1e-5;  // of the residual; below it numbers are double
 
 /// Diffusion: TwoPoint<T, Graph>, or PublishedWeights<T>, whose unknowns are kappa phi.
@@ -59,16 +57,17 @@ class GraphSubsurface final : public Subsurface {
     for (const auto& node : graph_.surface) {
       places.push_back({node.place, node.normal, std::sqrt(2.0 * node.area)});
     }
-    if constexpr (!kIsLattice) add_vertices(places);
+    add_vertices(places);
     return places;
   }
 
   void look_at_shape() override {
     if constexpr (kIsLattice) {
-      std::vector<Vec3> places;
-      for (const auto& node : graph_.surface) places.push_back(node.place);
-      to_vertices_ = nearest_interpolation(
-          places, surface().vertices, std::min<int>(kNearest, static_cast<int>(places.size())));
+      std::vector<SurfaceSample> samples;
+      for (const auto& node : graph_.surface) {
+        samples.push_back({node.place, node.normal * node.area});
+      }
+      to_vertices_ = fitted_interpolation(samples, surface());
     } else {
       to_vertices_ = fitted_interpolation(surface());
     }
@@ -104,12 +103,7 @@ class GraphSubsurface final : public Subsurface {
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
     const SurfaceLight light = light_of(q.first(graph_.surface.size()));
-    if constexpr (kIsLattice) {
-      return {interpolated(to_vertices_, light.fluence),
-              interpolated(to_vertices_, light.net_flux)};
-    } else {
-      return with_flux(interpolated(to_vertices_, light.fluence), q.subspan(graph_.surface.size()));
-    }
+    return with_flux(interpolated(to_vertices_, light.fluence), q.subspan(graph_.surface.size()));
   }
 
  private:
@@ -127,8 +121,12 @@ class GraphSubsurface final : public Subsurface {
     const TriangleMesh& mesh = surface();
     const std::vector<Vec3> normals = vertex_normals(mesh);
     std::vector<double> areas(mesh.vertices.size());
-    for (std::size_t s = 0; s < graph_.surface.size(); ++s)
-      for (const int v : mesh.triangles[s]) areas[v] += graph_.surface[s].area / 3.0;
+    for (const auto& triangle : mesh.triangles) {
+      const Vec3 a = mesh.vertices[triangle[0]];
+      const double area =
+          0.5 * length(cross(mesh.vertices[triangle[1]] - a, mesh.vertices[triangle[2]] - a));
+      for (const int v : triangle) areas[v] += area / 3.0;
+    }
     for (std::size_t v = 0; v < areas.size(); ++v)
       places.push_back({mesh.vertices[v], normals[v], std::sqrt(areas[v])});
   }

@@ -96,8 +96,8 @@ class Subsurface {
 
   const TriangleMesh& surface() const { return surface_; }
   const Report& report() const { return report_; }
-  /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges(). Of a graph: the middles of its
-  /// triangles, then its vertices.
+  /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges(). Of a graph the middles of its
+  /// triangles, of a lattice its boundary nodes; then the vertices.
   const std::vector<SurfacePlace>& places() const { return places_; }
   /// Of elements the edges of surface(), by its vertices; else none.
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }

@@ -135,6 +135,39 @@ TEST(SurfaceFit, DoesNotLookAroundAThinEdge) {
   for (int v = 7; v < count; ++v) EXPECT_NEAR(read[v][0], 1.0, 1e-5) << v;
 }
 
+/// Samples strewn over a plane, each for the same area: a golden spiral.
+std::vector<SurfaceSample> strewn(int count, double radius) {
+  std::vector<SurfaceSample> samples;
+  for (int n = 0; n < count; ++n) {
+    const double r = radius * std::sqrt((n + 0.5) / count);
+    samples.push_back({{r * std::cos(2.4 * n), r * std::sin(2.4 * n), 0.0}, {0.0, 0.0, 1.0}});
+  }
+  return samples;
+}
+
+TEST(SurfaceFit, ReadsSamplesThatAreNoTrianglesAndNotThoseOfAnotherSide) {
+  std::vector<SurfaceSample> samples = strewn(400, 10.0);
+  Values values;
+  const auto quadratic = [](Vec3 p) {
+    return 2.0 - 0.3 * p.x + 0.04 * p.x * p.y - 0.1 * p.y * p.y;
+  };
+  for (const SurfaceSample& s : samples) {
+    values.emplace_back().fill(static_cast<float>(quadratic(s.place)));
+  }
+  for (SurfaceSample s : strewn(400, 10.0)) {  // the back of a sheet, dark
+    s.place.z = -0.1;
+    s.area.z = -1.0;
+    samples.push_back(s);
+    values.push_back({0.0F, 0.0F, 0.0F});
+  }
+  TriangleMesh mesh = sheet(6);
+  for (Vec3& p : mesh.vertices) p = p - Vec3{3.0, 3.0, 0.0};
+  const Values read = interpolated(fitted_interpolation(samples, mesh), values);
+  for (std::size_t v = 0; v < read.size(); ++v) {
+    EXPECT_NEAR(read[v][0], quadratic(mesh.vertices[v]), 2e-4) << v;
+  }
+}
+
 TEST(SurfaceFit, AVertexWithoutTrianglesIsDark) {
   TriangleMesh mesh = ball(0.3);
   mesh.vertices.push_back({5.0, 0.0, 0.0});

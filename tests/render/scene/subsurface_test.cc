@@ -8,6 +8,7 @@
 #include "render/mesh/shapes.h"
 #include "render/scene/solid.h"
 #include "tests/render/mesh_samples.h"
+#include "tests/render/scene/exact_sphere.h"
 #include "tests/support/temporary_directory.h"
 
 namespace opaline::render {
@@ -80,6 +81,49 @@ TEST(Subsurface, ASphereWithACoreShinesAsItsClosedForm) {
           << static_cast<int>(method);
     }
   }
+}
+
+/// Relative RMS of what the sphere of 10 mm sends along its normal, phi + 3 J_n, under a lamp far above it, against the series.
+double lamp_error(Discretisation method, double tetrahedra) {
+  const auto solid = make_shape("sphere", 20.0);
+  const Boundary boundary = *make_boundary(reconstruct::diffusion::BoundaryModel::kTwoMoment, 1.3);
+  const auto lamp = [](double cosine) { return std::max(0.0, cosine); };
+  const Optics material = optics(1.0, 0.01);
+  const ExactSphere exact(10.0, material.diffusion[0], material.absorption[0], boundary, lamp);
+  ThreadTeam team(2);
+  const auto body = Subsurface::create(
+      **solid,
+      [&](Vec3) { return material; },
+      1.3,
+      {.method = method, .directions = 0, .tetrahedra = tetrahedra, .tolerance = 1e-6},
+      team,
+      {});
+  EXPECT_TRUE(body);
+  std::vector<std::array<float, 3>> q;
+  for (const auto& place : (*body)->places()) {
+    q.emplace_back().fill(static_cast<float>(lamp(place.normal.z)));
+  }
+  EXPECT_TRUE((*body)->light(q, {}, {}));
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t v = 0; v < (*body)->surface().vertices.size(); ++v) {
+    const double cosine = normalized((*body)->surface().vertices[v]).z;
+    const double truth = exact.fluence(cosine) + 3.0 * exact.net_flux(cosine, lamp(cosine));
+    const double own = (*body)->lit().fluence[v][0] + 3.0 * (*body)->lit().net_flux[v][0];
+    error += (own - truth) * (own - truth);
+    size += truth * truth;
+  }
+  return std::sqrt(error / size);
+}
+
+// A lattice read by averages of its four nearest nodes was off by 2.9 % and 2.4 %.
+TEST(Subsurface, ALampsLightLeavesASphereAsInItsSeries) {
+  using enum Discretisation;
+  EXPECT_LT(lamp_error(kElements, 13e3), 0.006);
+  EXPECT_LT(lamp_error(kElements, 52e3), 0.003);
+  EXPECT_LT(lamp_error(kGraph, 13e3), 0.005);
+  EXPECT_LT(lamp_error(kPolygrid, 13e3), 0.028);
+  EXPECT_LT(lamp_error(kPolygrid, 52e3), 0.020);
 }
 
 TEST(Subsurface, TheSameThingAHundredthOrAThousandMillimetresLargeShinesTheSame) {
