@@ -105,6 +105,9 @@ void ProgramCommands::declare_view(CLI::App& app,
   sub->add_option("--frames", view_.frames, "Ends after this many pictures")
       ->check(CLI::Range(0, 1'000'000));
   sub->add_option("--screenshot", view_.screenshot, "PNG of the window before it ends");
+  sub->add_option("--step-pictures",
+                  view_.step_pictures,
+                  "Directory for a PNG of the window after each --do, named by number and verb");
   sub->add_option("--width", view_.width, "Of the window, pixels")->check(CLI::Range(64, 8192));
   sub->add_option("--height", view_.height, "Of the window, pixels")->check(CLI::Range(64, 8192));
   sub->add_option("--device", view_.device, "Part of the name of the Vulkan device");

@@ -14,6 +14,7 @@ struct ViewWish {
   std::vector<std::string> actions;
   int frames = 0;
   std::string screenshot;
+  std::string step_pictures;
   int width = 1280;
   int height = 800;
   std::string device;

@@ -213,9 +213,10 @@ void follow_mouse(ViewModel& model, ViewDesk& desk, int width, int height) {
     if (!still) model.turn_light(static_cast<std::size_t>(desk.light), right, up);
   } else if (!desk.painting) {
     if (!still) model.orbit(right, -up);
-  } else if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) ||
-             std::hypot(io.MouseDelta.x, io.MouseDelta.y) >= kPixelsBetweenDabs) {
-    const auto cells = model.paint(io.MousePos.x, io.MousePos.y, width, height, desk.brush);
+  } else if (const bool begins = ImGui::IsMouseClicked(ImGuiMouseButton_Left);
+             begins || std::hypot(io.MouseDelta.x, io.MouseDelta.y) >= kPixelsBetweenDabs) {
+    const auto cells =
+        model.paint(io.MousePos.x, io.MousePos.y, width, height, desk.brush, !begins);
     say(desk, cells, fmt::format("{} cells", cells ? *cells : 0));
   }
 }

@@ -16,12 +16,13 @@ struct Verb {
   std::string_view name;
   std::string_view words;
 };
-constexpr std::array<Verb, 18> kVerbs{{{"orbit", "nn"},
+constexpr std::array<Verb, 19> kVerbs{{{"orbit", "nn"},
                                        {"zoom", "n"},
                                        {"pan", "nn"},
                                        {"light", "nnn"},
                                        {"exposure", "n"},
                                        {"paint", "nn"},
+                                       {"stroke", "nnnn"},
                                        {"brush", "ww"},
                                        {"undo", ""},
                                        {"redo", ""},

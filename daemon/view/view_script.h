@@ -12,7 +12,7 @@ namespace opaline::daemon {
 /// One thing that `opaline view --do` does, in place of a hand:
 ///
 ///   orbit RIGHT UP | zoom FACTOR | pan RIGHT UP | light NUMBER RIGHT UP | exposure STOPS      degrees; shares of the height
-///   paint X Y | brush NAME VALUE | undo | redo | save OBJECT FILE.vdb                            X, Y 0 to 1 in the window
+///   paint X Y | stroke X Y X Y | brush NAME VALUE | undo | redo | save OBJECT FILE.vdb           X, Y 0 to 1 in the window
 ///   bend OBJECT AMOUNT | tolerance VALUE
 ///   resize WIDTH HEIGHT | minimise | restore | lose | wait FRAMES | screenshot FILE.png
 struct ViewAction {

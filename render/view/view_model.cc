@@ -142,32 +142,33 @@ std::optional<ViewModel::Place> ViewModel::at(double x, double y, int width, int
   return Place{static_cast<std::size_t>(hit->object), hit->vertices[nearest]};
 }
 
-Result<std::size_t> ViewModel::paint(double x, double y, int width, int height, EditOptions brush) {
+Result<std::size_t> ViewModel::paint(
+    double x, double y, int width, int height, EditOptions brush, bool goes_on) {
   hold();
   const auto place = at(x, y, width, height);
+  if (!goes_on) ++stroke_;
   TranslucentBody* const body = place ? renderer_->body(place->object) : nullptr;
   if (body == nullptr) return std::size_t{0};
   brush.centre = body->own_place(place->vertex);
   brush.direction = body->own_normal(place->vertex);
-  auto cells = body->edit({brush});
-  if (!cells || *cells == 0) return cells;
-  done_.push_back(place->object);
-  undone_.clear();
-  changed();
-  return cells;
+  return dab(place->object, brush);
 }
 
 Result<std::size_t> ViewModel::paint_all(std::size_t object, EditOptions brush) {
   hold();
-  TranslucentBody* const body = renderer_->body(object);
-  if (body == nullptr) return std::size_t{0};
+  ++stroke_;
+  if (renderer_->body(object) == nullptr) return std::size_t{0};
   brush.reach = EditOptions::Reach::kBall;
   brush.radius_mm = kEverywhere;
   brush.softness = 0.0;
   brush.mask.clear();
-  auto cells = body->edit({brush});
+  return dab(object, brush);
+}
+
+Result<std::size_t> ViewModel::dab(std::size_t object, const EditOptions& brush) {
+  auto cells = renderer_->body(object)->edit({brush});
   if (!cells || *cells == 0) return cells;
-  done_.push_back(object);
+  done_.push_back({object, stroke_});
   undone_.clear();
   changed();
   return cells;
@@ -175,29 +176,35 @@ Result<std::size_t> ViewModel::paint_all(std::size_t object, EditOptions brush) 
 
 Result<bool> ViewModel::undo() {
   hold();
-  while (!done_.empty()) {
-    const std::size_t object = done_.back();
+  std::optional<std::size_t> stroke;
+  while (!done_.empty() && (!stroke || done_.back().stroke == *stroke)) {
+    const Dab last = done_.back();
     done_.pop_back();
-    const auto back = renderer_->body(object)->undo();
+    const auto back = renderer_->body(last.object)->undo();
     if (!back) return back.error();
     if (!*back) continue;  // forgotten
-    undone_.push_back(object);
+    stroke = last.stroke;
+    undone_.push_back(last);
     changed();
-    return true;
   }
-  return false;
+  return stroke.has_value();
 }
 
 Result<bool> ViewModel::redo() {
   hold();
   if (undone_.empty()) return false;
-  const std::size_t object = undone_.back();
-  undone_.pop_back();
-  const auto again = renderer_->body(object)->redo();
-  if (!again) return again.error();
-  done_.push_back(object);
-  changed();
-  return *again;
+  const std::size_t stroke = undone_.back().stroke;
+  bool all = true;
+  while (!undone_.empty() && undone_.back().stroke == stroke) {
+    const Dab next = undone_.back();
+    undone_.pop_back();
+    const auto again = renderer_->body(next.object)->redo();
+    if (!again) return again.error();
+    done_.push_back(next);
+    changed();
+    all = all && *again;
+  }
+  return all;
 }
 
 Result<std::size_t> ViewModel::bend(std::size_t object, double amount) {

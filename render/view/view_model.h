@@ -44,9 +44,10 @@ class ViewModel {
   };
   std::optional<Place> at(double x, double y, int width, int height) const;
 
-  /// A stroke at a pixel, along the surface's normal there; 0 where there is nothing translucent. Answers how many cells
-  /// changed.
-  Result<std::size_t> paint(double x, double y, int width, int height, EditOptions brush);
+  /// A dab of the brush at a pixel, along the surface's normal there; 0 where there is nothing translucent. Answers how many
+  /// cells changed. One that goes on belongs to the stroke of the dab before: both are taken back together.
+  Result<std::size_t> paint(
+      double x, double y, int width, int height, EditOptions brush, bool goes_on = false);
   /// The same all through an object, whatever the brush's place and reach.
   Result<std::size_t> paint_all(std::size_t object, EditOptions brush);
   Result<bool> undo();  ///< the last stroke that was not taken back, of any object
@@ -102,6 +103,7 @@ class ViewModel {
     dark_ = true;
     ++version_;
   }
+  Result<std::size_t> dab(std::size_t object, const EditOptions& brush);
   Result<void> light(std::stop_token stop);
   void hold();
   void has_light();
@@ -119,8 +121,13 @@ class ViewModel {
   std::vector<LightOptions> lights_;
   std::unique_ptr<SceneRenderer> renderer_;
   std::unique_ptr<RasterRenderer> raster_;
-  std::vector<std::size_t> done_;  // objects of strokes
-  std::vector<std::size_t> undone_;
+  struct Dab {
+    std::size_t object = 0;
+    std::size_t stroke = 0;
+  };
+  std::vector<Dab> done_;
+  std::vector<Dab> undone_;
+  std::size_t stroke_ = 0;  // of the last dab
   double white_ = 0.0;
   std::uint64_t version_ = 0;
   bool dark_ = true;    // to be lit anew

@@ -16,6 +16,7 @@ namespace opaline {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 constexpr const char* kScene = R"(
 [diffusion]
@@ -118,6 +119,49 @@ TEST_F(Viewer, PaintsTakesBackAndSavesWhatItPainted) {
   const auto material = read_material(directory_.path() / "ring.vdb");
   ASSERT_TRUE(material) << material.error().message;
   EXPECT_NEAR(*std::ranges::max_element(material->channels[0].absorption), 0.9, 0.01);
+}
+
+TEST_F(Viewer, AScriptedStrokeIsOneAndSaysWhatItTouched) {
+  const auto steps = directory_.path() / "steps";
+  std::filesystem::create_directory(steps);
+  ASSERT_EQ(view({"--width",
+                  "800",
+                  "--height",
+                  "600",
+                  "--step-pictures",
+                  steps.string(),
+                  "--do",
+                  "brush operation paint",
+                  "--do",
+                  "brush value 0.9,0.01,0.01",
+                  "--do",
+                  "brush radius 1.5",
+                  "--do",
+                  "stroke 0.70 0.50 0.74 0.60",
+                  "--do",
+                  "undo",
+                  "--do",
+                  "redo",
+                  "--do",
+                  "undo",
+                  "--do",
+                  "undo",
+                  "--do",
+                  "paint 0.99 0.01",
+                  "--do",
+                  "save ring " + file("ring.vdb")}),
+            0)
+      << said_;
+  EXPECT_THAT(said_, MatchesRegex(".*paint +[1-9][0-9]+ cells by [1-9][0-9]+ dabs\n.*"));
+  EXPECT_THAT(said_, HasSubstr("undo     there is none"));
+  EXPECT_THAT(said_, HasSubstr("paint    0 cells: nothing is seen there"));
+  EXPECT_THAT(said_, MatchesRegex(".*save +.*ring.vdb: origin = .*"));
+  const int before = green_less_red(picture("steps/03-brush.png"));
+  const int painted = green_less_red(picture("steps/04-stroke.png"));
+  EXPECT_GT(painted, before + 10'000) << said_;
+  EXPECT_NEAR(green_less_red(picture("steps/05-undo.png")), before, 500);
+  EXPECT_NEAR(green_less_red(picture("steps/06-redo.png")), painted, 500);
+  EXPECT_NEAR(green_less_red(picture("steps/07-undo.png")), before, 500);
 }
 
 TEST_F(Viewer, LivesThroughResizingMinimisingAndALostDevice) {

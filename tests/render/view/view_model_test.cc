@@ -124,6 +124,29 @@ TEST_F(View, AStrokeIsSeenTakenBackAndDoneAgain) {
   EXPECT_LE(largest_difference(picture(), painted), 2);
 }
 
+TEST_F(View, TheDabsOfAStrokeAreTakenBackTogetherAndTheStrokeBeforeStays) {
+  EditOptions brush;
+  brush.value = {0.5, 0.5, 0.01};
+  brush.radius_mm = 2.0;
+  ASSERT_GT(*model_->paint(kX, kY, kWidth, kHeight, brush), 0U);
+  const auto first = picture();
+  ASSERT_TRUE(
+      model_->paint(1.0, 1.0, kWidth, kHeight, brush));  // a stroke that begins beside the ring
+  ASSERT_GT(*model_->paint(kX + 12.0, kY, kWidth, kHeight, brush, true), 0U);
+  ASSERT_GT(*model_->paint(kX + 18.0, kY - 3.0, kWidth, kHeight, brush, true), 0U);
+  const auto both = picture();
+  EXPECT_GT(largest_difference(both, first), 10);
+
+  ASSERT_TRUE(*model_->undo());
+  EXPECT_LE(largest_difference(picture(), first), 2);
+  ASSERT_TRUE(*model_->redo());
+  EXPECT_LE(largest_difference(picture(), both), 2);
+  EXPECT_FALSE(*model_->redo());
+  ASSERT_TRUE(*model_->undo());
+  ASSERT_TRUE(*model_->undo());
+  EXPECT_FALSE(*model_->undo());
+}
+
 TEST_F(View, PaintingBesideTheObjectsDoesNothing) {
   const auto cells = model_->paint(1.0, 1.0, kWidth, kHeight, {});
   ASSERT_TRUE(cells);
