@@ -27,6 +27,7 @@ struct Element {
   std::string name;
   std::size_t count = 0;
   std::vector<Property> properties;
+  int line = 0;  // of the header
 };
 
 struct Header {
@@ -83,7 +84,7 @@ Result<void> parse_header_line(std::string_view words, const TextScanner& scanne
     const std::string_view number = TextScanner::word_of(words);
     const auto count = TextScanner::to_number<std::size_t>(number);
     if (!count) return scanner.expected("how many elements", number);
-    header.elements.push_back({std::string(name), *count, {}});
+    header.elements.push_back({std::string(name), *count, {}, scanner.line()});
   } else if (keyword == "property") {
     if (header.elements.empty())
       return scanner.expected("an element before its property", "property");
@@ -94,18 +95,44 @@ Result<void> parse_header_line(std::string_view words, const TextScanner& scanne
   return ok();
 }
 
+bool is_corner_list(const Property& property) {
+  return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
+}
+
+Result<void> check_properties(const Element& element) {
+  const auto lacks = [&](std::string_view what) {
+    return invalid_argument(
+        fmt::format("line {}: element {} has no property {}", element.line, element.name, what));
+  };
+  for (const std::string_view axis : {"x", "y", "z"}) {
+    const bool known = std::ranges::any_of(
+        element.properties, [&](const Property& p) { return p.name == axis && !p.is_list; });
+    if (element.name == "vertex" && !known) return lacks(axis);
+  }
+  if (element.name == "face" && std::ranges::none_of(element.properties, is_corner_list)) {
+    return lacks("list vertex_indices");
+  }
+  return ok();
+}
+
 Result<Header> parse_header(TextScanner& scanner) {
   Header header;
   const auto magic = scanner.next_line();
   if (!magic || *magic != "ply") return scanner.expected("ply", magic.value_or(""));
   while (const auto line = scanner.next_line()) {
-    if (*line == "end_header") return header;
+    if (*line == "end_header") {
+      for (const Element& element : header.elements) {
+        if (auto checked = check_properties(element); !checked) return checked.error();
+      }
+      return header;
+    }
     if (auto parsed = parse_header_line(*line, scanner, header); !parsed) return parsed.error();
   }
   return scanner.expected("end_header", "");
 }
 
-/// Hands out one number after another, whatever the encoding; remembers when they ran out.
+/// Hands out one number after another, whatever the encoding; remembers when they ran out. As text each element has a line of
+/// its own.
 class Numbers {
  public:
   Numbers(TextScanner scanner, Encoding encoding)
@@ -113,8 +140,17 @@ class Numbers {
 
   double next(Type type) { return encoding_ == Encoding::kText ? next_text() : next_binary(type); }
   bool failed() const { return failed_; }
+  void begin_element() {
+    while (encoding_ == Encoding::kText && words_.find_first_not_of(" \t\r") == words_.npos) {
+      const auto line = scanner_.next_line();
+      if (!line) return;
+      words_ = line->substr(0, line->find('#'));
+    }
+  }
+  /// Whether the element's line says more.
+  bool has_more() const { return words_.find_first_not_of(" \t\r") != words_.npos; }
   std::size_t bytes_left() const {
-    return encoding_ == Encoding::kText ? scanner_.rest().size() + 64 : bytes_.size();
+    return encoding_ == Encoding::kText ? words_.size() : bytes_.size();
   }
   std::string where() const {
     return encoding_ == Encoding::kText ? fmt::format("line {}: ", scanner_.line()) : std::string();
@@ -122,7 +158,7 @@ class Numbers {
 
  private:
   double next_text() {
-    const auto value = TextScanner::to_number<double>(scanner_.next_word());
+    const auto value = TextScanner::to_number<double>(TextScanner::word_of(words_));
     failed_ = failed_ || !value;
     return value.value_or(0.0);
   }
@@ -167,12 +203,9 @@ class Numbers {
   TextScanner scanner_;
   Encoding encoding_;
   std::string_view bytes_;
+  std::string_view words_;  // what is left of an element's line
   bool failed_ = false;
 };
-
-bool is_corner_list(const Property& property) {
-  return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
-}
 
 /// Reads one element into the mesh; false when the numbers make no sense.
 bool read_element(const Element& element,
@@ -180,6 +213,7 @@ bool read_element(const Element& element,
                   std::vector<int>& corners,
                   TriangleMesh& mesh) {
   Vec3 point;
+  numbers.begin_element();
   for (const Property& property : element.properties) {
     if (property.is_list) {
       const double count = numbers.next(property.count_type);
@@ -199,7 +233,7 @@ bool read_element(const Element& element,
     if (property.name == "z") point.z = value;
   }
   if (element.name == "vertex") mesh.vertices.push_back(point);
-  return !numbers.failed();
+  return !numbers.failed() && !numbers.has_more();
 }
 
 }  // namespace
@@ -216,11 +250,13 @@ Result<TriangleMesh> decode_ply(std::string_view bytes, const std::stop_token& s
     for (std::size_t i = 0; i < element.count; ++i) {
       if (stopped_at(i, stop)) return cancelled("reading the mesh");
       if (!read_element(element, numbers, corners, mesh)) {
-        return invalid_argument(fmt::format("{}{} {} of {} is damaged or cut off",
-                                            numbers.where(),
-                                            element.name,
-                                            i,
-                                            element.count));
+        return invalid_argument(
+            fmt::format("{}{} {} of {} is damaged or cut off{}",
+                        numbers.where(),
+                        element.name,
+                        i,
+                        element.count,
+                        numbers.has_more() ? ": more numbers than properties" : ""));
       }
     }
   }

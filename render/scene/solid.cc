@@ -6,6 +6,7 @@
 
 #include "base/io/level_set_io.h"
 #include "render/mesh/mesh_distance.h"
+#include "render/mesh/overlap.h"
 #include "render/mesh/read_mesh.h"
 #include "render/mesh/shapes.h"
 #include "render/mesh/turn.h"
@@ -60,6 +61,7 @@ Result<TriangleMesh> placed_surface(const ShapeOptions& shape,
 }
 
 std::vector<std::string> notes_on(const TriangleMesh& mesh,
+                                  const MeshDistance& distance,
                                   const std::filesystem::path& file,
                                   const std::stop_token& stop) {
   const MeshTopology found = topology(weld(mesh, stop), stop);
@@ -80,6 +82,10 @@ std::vector<std::string> notes_on(const TriangleMesh& mesh,
         fmt::format("neighbouring triangles face different ways at {} edges: what they enclose may "
                     "not be what was meant",
                     found.flipped_edges));
+  }
+  if (const double buried = buried_share(mesh, distance, stop); buried > 0.0) {
+    say(fmt::format("{:.2g} % of its surface lies inside it: parts that overlap are joined",
+                    100.0 * buried));
   }
   return notes;
 }
@@ -123,10 +129,10 @@ Result<LoadedShape> load_shape(const ShapeOptions& shape,
   now("the signed distance of");
   auto solid = MeshDistance::create(*surface, stop);
   if (!solid) return solid.error().in(shape.file.string());
-  loaded.solid = *std::move(solid);
-  now("looking for holes in");
-  loaded.notes = notes_on(*surface, shape.file, stop);
+  now("looking for holes and overlaps in");
+  loaded.notes = notes_on(*surface, **solid, shape.file, stop);
   if (stop.stop_requested()) return cancelled("looking for holes");
+  loaded.solid = *std::move(solid);
   loaded.surface = *std::move(surface);
   return loaded;
 }

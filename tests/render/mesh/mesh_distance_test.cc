@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "render/mesh/overlap.h"
 #include "render/mesh/shapes.h"
 #include "tests/render/mesh_samples.h"
 
@@ -94,6 +95,43 @@ TEST(MeshDistance, WhatOverlapsIsOneSolid) {
         std::min(distance_to_box(p, 2.0), distance_to_box(p - Vec3{1.0, 0.5, 0.5}, 2.0));
     EXPECT_EQ((*distance)->at(p) < 0.0, expected < 0.0);
   }
+}
+
+double buried_in(const TriangleMesh& mesh) {
+  const auto distance = MeshDistance::create(mesh);
+  EXPECT_TRUE(distance);
+  return buried_share(mesh, **distance, {});
+}
+
+void turn_over(TriangleMesh& mesh) {
+  for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
+}
+
+TEST(Overlap, IsTheShareOfTheSurfaceThatLiesInside) {
+  TriangleMesh cubes = cube_mesh(2.0);
+  append(cubes, cube_mesh(2.0, {1.0, 1.0, 1.0}));
+  EXPECT_NEAR(buried_in(cubes), 6.0 / 48.0, 0.005);  // three unit squares of each
+  turn_over(cubes);
+  EXPECT_NEAR(buried_in(cubes), 6.0 / 48.0, 0.005);
+  TriangleMesh within = sphere_mesh(2.0, 24);
+  append(within, sphere_mesh(1.0, 24));
+  EXPECT_NEAR(buried_in(within), 0.2, 0.01);
+}
+
+TEST(Overlap, IsNoneOfCavitiesHolesTurnedTrianglesAndPartsApart) {
+  TriangleMesh cavity = sphere_mesh(1.0, 24);
+  turn_over(cavity);
+  append(cavity, sphere_mesh(2.0, 24));
+  EXPECT_EQ(buried_in(cavity), 0.0);
+  TriangleMesh open = cube_mesh(2.0);
+  open.triangles.resize(9);
+  EXPECT_EQ(buried_in(open), 0.0);
+  TriangleMesh turned = sphere_mesh(1.0, 24);
+  std::swap(turned.triangles[7][0], turned.triangles[7][1]);
+  EXPECT_EQ(buried_in(turned), 0.0);
+  TriangleMesh apart = cube_mesh(1.0);
+  append(apart, cube_mesh(1.0, {1.25, 0.0, 0.0}));
+  EXPECT_EQ(buried_in(apart), 0.0);
 }
 
 TEST(MeshDistance, TrianglesWithoutAreaAreRefused) {

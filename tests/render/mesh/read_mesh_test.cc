@@ -157,6 +157,18 @@ TEST(ReadMesh, AnErrorNamesTheLine) {
   EXPECT_THAT(decode_mesh("off", "OFF\n1000000000 1 0\n").error().message, HasSubstr("do not fit"));
   EXPECT_THAT(decode_mesh("ply", "ply\nformat ascii 1.0\nelement vertex many\n").error().message,
               HasSubstr("line 3"));
+  const std::string ply = cube_as_ply("ascii");
+  const auto changed = [&ply](std::string_view what, std::string_view to) {
+    std::string text = ply;
+    return decode_mesh("ply", text.replace(text.find(what), what.size(), to)).error().message;
+  };
+  EXPECT_THAT(changed("property float y\n", ""),
+              HasSubstr("line 4: element vertex has no property y"));
+  EXPECT_THAT(changed("property list uchar int vertex_indices\n", "property uchar red\n"),
+              HasSubstr("line 9: element face has no property list vertex_indices"));
+  EXPECT_THAT(changed(" 7\n", "\n"), HasSubstr("line 12: vertex 0 of 8 is damaged or cut off"));
+  EXPECT_THAT(changed(" 7\n", " 7 7\n"),
+              HasSubstr("line 12: vertex 0 of 8 is damaged or cut off: more numbers"));
   EXPECT_THAT(decode_mesh("stl", cube_as_stl(true).substr(0, 200)).error().message,
               HasSubstr("triangle 2 of 12"));
 }
@@ -208,7 +220,8 @@ TEST(ReadMesh, StopsWhenAskedInEveryFormat) {
     off += "0 0 0\n";
   }
   const std::string ply =
-      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n";
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+      "y\nproperty float z\nend_header\n0 0 0\n";
   std::string stl(84, '\0');
   stl[80] = 1;
   stl += std::string(50, '\0');

@@ -58,7 +58,9 @@ TEST(ReadTets, NamesTheLineOfWhatItDoesNotUnderstand) {
               HasSubstr("version 4.2"));
   EXPECT_THAT(decode_tets("mesh", "").error().message, HasSubstr("no tetrahedra"));
   EXPECT_THAT(decode_tets("mesh", "Vertices 1 0 0 0 0\nTetrahedra 1\n1 2 3 4 0\n").error().message,
-              HasSubstr("names vertex 1 of 1"));
+              HasSubstr("line 3: names vertex 4 of 1"));
+  EXPECT_THAT(decode_tets("mesh", "Tetrahedra 2\n1 2 3 4 0\n1 2 0 4 0\n").error().message,
+              HasSubstr("line 3: a vertex number below 1"));
   EXPECT_THAT(decode_tets("obj", "").error().message, HasSubstr("there are mesh, msh, vtk"));
 }
 
