@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -39,9 +40,14 @@ class LiveObject {
                                               [this](const auto& r) { return answer(r); });
     if (!control) return control.error();
     while (!stop_.stop_requested() && is_watched()) {
+      const std::stop_token another_wish = watch_for_wishes();
       const auto batch = wishes_->take(kPatience, stop_.get_token());
-      if (!batch) continue;
-      auto shown = show(*batch);
+      if (!batch && is_settled_) continue;
+      auto shown = batch ? show(*batch) : draw(render::Pace::kAtRest, another_wish);
+      if (!batch && another_wish.stop_requested()) {
+        is_settled_ = false;
+        continue;
+      }
       const bool is_over = !shown && (stop_.stop_requested() || number_ == 0);
       if (is_over) return stop_.stop_requested() ? ok() : shown;
       if (!shown) figures_["message"] = shown.error().message;
@@ -55,7 +61,21 @@ class LiveObject {
     return options_.while_watched.count() == 0 || live_->is_watched(options_.while_watched);
   }
 
+  /// Stopped by the next request.
+  std::stop_token watch_for_wishes() {
+    const std::lock_guard lock(settling_mutex_);
+    settling_ = std::stop_source();
+    return settling_.get_token();
+  }
+
   nlohmann::json answer(const nlohmann::json& request) {
+    nlohmann::json answered = answered_to(request);
+    const std::lock_guard lock(settling_mutex_);
+    settling_.request_stop();
+    return answered;
+  }
+
+  nlohmann::json answered_to(const nlohmann::json& request) {
     const auto it = request.find("command");
     const bool is_word = it != request.end() && it->is_string();
     if (is_word && *it == "cancel") {
@@ -76,14 +96,25 @@ class LiveObject {
         if (auto done = perform(step); !done) return done;
       }
     }
-    const auto radiance = view_->picture(batch.scene.lights, batch.scene.camera, stop_.get_token());
+    scene_ = batch.scene;
+    figures_["edits"] = batch.scene.objects.back().edits.size();
+    figures_["can_undo"] = batch.undoable > 0;
+    figures_["can_redo"] = batch.redoable > 0;
+    const bool is_moving = number_ > 0 && !batch.is_new_scene;
+    return draw(is_moving ? render::Pace::kMoving : render::Pace::kAtRest, stop_.get_token());
+  }
+
+  Result<void> draw(render::Pace pace, const std::stop_token& stop) {
+    is_settled_ = true;  // also where it fails: that is told once
+    const auto radiance = view_->picture(scene_.lights, scene_.camera, pace, stop);
     if (!radiance) return radiance.error();
-    if (!(white_ > 0.0)) white_ = white_of(*radiance, batch.scene.picture);
-    auto png = developed(*radiance, white_, batch.scene.picture, ImageFormat::kPng);
+    if (!(white_ > 0.0)) white_ = white_of(*radiance, scene_.picture);
+    auto png = developed(*radiance, white_, scene_.picture, ImageFormat::kPng);
     if (!png) return png.error();
     png_ = *std::move(png);
     ++number_;
-    describe(batch);
+    is_settled_ = !view_->renderer().is_provisional();
+    describe();
     return ok();
   }
 
@@ -113,13 +144,11 @@ class LiveObject {
     return done ? ok() : Result<void>(done.error());
   }
 
-  void describe(const ObjectWishes::Batch& batch) {
+  void describe() {
     const render::SceneStatistics& s = view_->renderer().statistics();
     const auto& last = s.objects.back();
     figures_["by"] = "object";
-    figures_["edits"] = batch.scene.objects.back().edits.size();
-    figures_["can_undo"] = batch.undoable > 0;
-    figures_["can_redo"] = batch.redoable > 0;
+    figures_["settled"] = is_settled_;
     figures_["seconds"] = to_json(s)["seconds"];
     figures_["iterations"] = last.iterations;
     figures_["relative_residual"] = last.relative_residual;
@@ -139,7 +168,11 @@ class LiveObject {
   std::vector<std::byte> png_;
   nlohmann::json figures_ = nlohmann::json::object();
   double white_ = 0.0;
+  render::Scene scene_;  // of the last batch
   int number_ = 0;
+  bool is_settled_ = true;
+  std::mutex settling_mutex_;
+  std::stop_source settling_;  // guarded by settling_mutex_; a request stops it
 };
 
 }  // namespace

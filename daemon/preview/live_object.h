@@ -25,7 +25,10 @@ namespace opaline::daemon {
 /// last as long as the program. Whoever changes the file with an editor sees that, too, after the object is made ready anew;
 /// a file with a mistake leaves the picture as it was, and the figures say what is wrong.
 ///
-/// Figures: "by": "object", "edits", "can_undo", "can_redo", "seconds" (the statistics' of the last picture), "iterations",
+/// While wishes come in, diffuse light is that of Pace::kMoving; once nothing is wished, a picture with all light followed comes
+/// after it ("settled"), unless another wish stops that.
+///
+/// Figures: "by": "object", "settled", "edits", "can_undo", "can_redo", "seconds" (the statistics' of the last picture), "iterations",
 /// "relative_residual", "drawn_by", "message" (what went wrong last; empty: nothing).
 struct LiveObjectOptions {
   std::chrono::seconds while_watched{0};  ///< ends once nobody has looked for so long; 0: Ctrl-C

@@ -34,8 +34,9 @@ Result<std::unique_ptr<SceneView>> SceneView::create(const render::Scene& scene,
 
 Result<Image<float>> SceneView::picture(const std::vector<render::LightOptions>& lights,
                                         const render::CameraOptions& camera,
+                                        render::Pace pace,
                                         std::stop_token stop) {
-  if (auto lit = renderer_->light(lights, stop); !lit) return lit.error();
+  if (auto lit = renderer_->light(lights, pace, stop); !lit) return lit.error();
   return drawn(render::camera_of(camera, scene_.picture), stop);
 }
 

@@ -32,10 +32,17 @@ class SceneView {
                                                    const render::SceneRenderer::Step& step,
                                                    std::stop_token stop);
 
-  /// Linear radiance and coverage of the scene as it is now, under these lights.
+  /// Linear radiance and coverage of the scene as it is now, under these lights. While a hand moves things, diffuse light may
+  /// be as Subsurface::light() says.
   Result<Image<float>> picture(const std::vector<render::LightOptions>& lights,
                                const render::CameraOptions& camera,
+                               render::Pace pace,
                                std::stop_token stop);
+  Result<Image<float>> picture(const std::vector<render::LightOptions>& lights,
+                               const render::CameraOptions& camera,
+                               std::stop_token stop) {
+    return picture(lights, camera, render::Pace::kAtRest, std::move(stop));
+  }
 
   render::SceneRenderer& renderer() { return *renderer_; }
   const render::Scene& scene() const { return scene_; }

@@ -263,10 +263,10 @@ DiffuseEntry Subsurface::enter(Followed& part,
     return is_near ? DiffuseEntry::kFollowedBefore : DiffuseEntry::kAtSurface;
   }
   const int directions = is_automatic ? kEnoughDirections : options_.directions;
-  part.q.clear();
-  part.light = first_scattering(
+  auto followed = first_scattering(
       *beams_, diffuse_beams(*beams_, on_faces(q), directions), deposit_at(), *team_, stop);
-  if (stop.stop_requested()) return DiffuseEntry::kDark;
+  if (stop.stop_requested()) return DiffuseEntry::kDark;  // and what was followed before stays
+  part.light = std::move(followed);
   part.q.assign(q.begin(), q.end());
   part.is_stale = false;
   return DiffuseEntry::kFollowed;

@@ -160,6 +160,27 @@ TEST_F(LiveObjectTest, ShowsAStrokeAndTakesItBackAndDoesItAgain) {
   EXPECT_LE(largest_difference(picture(), after), 1);
 }
 
+TEST_F(LiveObjectTest, FollowsTheLightOnceNothingIsWished) {
+  show();
+  const auto before = picture();
+  ASSERT_TRUE(look().value("settled", false));
+
+  ASSERT_EQ(wish(kDarkenGreenAndBlue).status, 202);
+  ASSERT_TRUE(shows("frame", 2)) << look().dump();
+  EXPECT_FALSE(look().value("settled", true)) << look().dump();
+  const auto moving = picture();
+  ASSERT_TRUE(shows("frame", 3)) << look().dump();
+  EXPECT_TRUE(look().value("settled", false)) << look().dump();
+
+  const auto settled = picture();
+  EXPECT_GT(largest_difference(moving, before), 5);
+  EXPECT_GT(largest_difference(settled, moving), 0);
+  EXPECT_LT(largest_difference(settled, moving), largest_difference(moving, before));
+  ASSERT_EQ(wish(R"({"command":"look","position_mm":[0,0,60],"target_mm":[0,0.1,0]})").status, 202);
+  ASSERT_TRUE(shows("frame", 4)) << look().dump();
+  EXPECT_TRUE(look().value("settled", false)) << look().dump();
+}
+
 TEST_F(LiveObjectTest, LooksFromElsewhereUnderAnotherLight) {
   show();
   const auto before = picture();

@@ -138,6 +138,23 @@ TEST_F(DiffusePace, AStrokeIsLitAsBeforeUntilItIsFollowed) {
   EXPECT_LT(difference(body->lit(), painted->lit()), kSame);
 }
 
+TEST_F(DiffusePace, WhatWasFollowedStaysWhenFollowingItAnewIsStopped) {
+  const auto body = made(DiffusionOptions::kAutomatic);
+  const Values environment = even(*body);
+  light(*body, environment, {}, Pace::kAtRest);
+  ASSERT_TRUE(body->set_material([](Vec3) { return optics_of(0.02); }));
+  light(*body, environment, {}, Pace::kMoving);
+  const SurfaceLight moving = body->lit();
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_FALSE(body->light({environment, {}, Pace::kAtRest}, {}, stop.get_token()));
+
+  light(*body, environment, {}, Pace::kMoving);
+
+  EXPECT_EQ(body->environment_entry(), DiffuseEntry::kFollowedBefore);
+  EXPECT_LT(difference(body->lit(), moving), kSame);
+}
+
 TEST_F(DiffusePace, GivenDirectionsAreFollowedWhateverMoves) {
   const auto body = made(2);
   light(*body, even(*body), lamp_from(*body, kBefore), Pace::kAtRest);
