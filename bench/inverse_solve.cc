@@ -301,8 +301,11 @@ Result<void> run(const Case& which,
       return judged;
     print_material_error(which.name, result->material, *truth, dataset.seen_face);
     if (extras.posterior) {
-      auto printed = print_posterior(which.name, measured, *truth, *result, options, **solver);
-      if (!printed) return printed;
+      const auto mean = print_posterior(which.name, measured, *truth, *result, options, **solver);
+      if (!mean) return mean.error();
+      if (auto judged = judge(which, "posterior_mean_", measured, margin, *mean, options, **solver);
+          !judged)
+        return judged;
     }
   }
   if (auto judged = judge(which, "", measured, margin, result->material, options, **solver);

@@ -69,7 +69,8 @@ Result<ChannelSolver::WarmStart> ChannelSolver::start(std::stop_token stop) cons
   if (full && options_.coarser_grids > 0 && options_.max_iterations > 0 &&
       options_.method != Method::kAsPublished) {
     if (const auto coarse = coarser_block(problem_.block))
-      return coarse_start(problem_, *coarse, options_, warm_, solver_, clock_, std::move(stop));
+      return coarse_start(
+          problem_, *coarse, options_, warm_, try_rivals_, solver_, clock_, std::move(stop));
   }
   if (warm_) return *warm_;
   const auto fit = fit_homogeneous(problem_, options_, solver_, std::move(stop));

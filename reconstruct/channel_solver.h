@@ -47,6 +47,8 @@ class ChannelSolver {
 
   /// What run() begins with instead of a homogeneous fit of its own.
   void start_from(WarmStart warm) { warm_ = std::move(warm); }
+  /// This grid is only a step on the way: HomogeneousFit::rivals are tried by whoever asks for that.
+  void leave_rivals() { try_rivals_ = false; }
   /// Runs to the end. Errors: kCancelled, the objective's, the checkpoint hook's.
   Result<ChannelProgress> run(std::optional<ChannelProgress> from, std::stop_token stop);
 
@@ -74,6 +76,7 @@ class ChannelSolver {
   ChannelProgress read_back_;             // where to go on from when the engine fails
   Objective objective_;
   std::optional<WarmStart> warm_;
+  bool try_rivals_ = true;
   long solves_before_ = 0;  // of the homogeneous fit and earlier runs of this channel
   double seconds_before_ = 0.0;
   std::chrono::nanoseconds start_{};

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFormat = 5;
+constexpr int kFormat = 6;
 constexpr std::size_t kLargestFile = std::size_t{4} << 30;
 static_assert(std::endian::native == std::endian::little, "numbers are stored little-endian");
 
@@ -37,22 +37,29 @@ std::optional<Interval> interval_from(const json& j) {
 }
 
 json to_json(const HomogeneousFit& h) {
+  json rivals = json::array();
+  for (const StartCoefficients& r : h.rivals)
+    rivals.push_back({r.reduced_scattering, r.absorption});
   return {h.reduced_scattering,
           h.absorption,
           h.chi_squared,
           h.iterations,
           to_json(h.reduced_scattering_interval),
-          to_json(h.absorption_interval)};
+          to_json(h.absorption_interval),
+          rivals};
 }
 
 HomogeneousFit homogeneous_from(const json& j) {
-  return {.reduced_scattering = j.at(0).get<double>(),
-          .absorption = j.at(1).get<double>(),
-          .chi_squared = j.at(2).get<double>(),
-          .iterations = j.at(3).get<int>(),
-          .solves = 0,
-          .reduced_scattering_interval = interval_from(j.at(4)),
-          .absorption_interval = interval_from(j.at(5))};
+  HomogeneousFit fit{.reduced_scattering = j.at(0).get<double>(),
+                     .absorption = j.at(1).get<double>(),
+                     .chi_squared = j.at(2).get<double>(),
+                     .iterations = j.at(3).get<int>(),
+                     .solves = 0,
+                     .reduced_scattering_interval = interval_from(j.at(4)),
+                     .absorption_interval = interval_from(j.at(5))};
+  for (const json& r : j.at(6))
+    fit.rivals.push_back({r.at(0).get<double>(), r.at(1).get<double>()});
+  return fit;
 }
 
 json to_json(const ModelReport& r) {

@@ -53,33 +53,63 @@ std::deque<CurvaturePair> prolonged_pairs(const Block& coarse,
   return out;
 }
 
+/// The rivals of the homogeneous fit that `best` began with, tried too: the lowest end is `best` then. Whether one was.
+template <typename Minimise>
+Result<bool> outdo(ChannelProgress& best, const Block& block, const Minimise& minimise) {
+  const std::size_t cells = block.cell_count();
+  const HomogeneousFit began = best.report.homogeneous;
+  long solves = best.report.solves;
+  bool outdone = false;
+  for (const StartCoefficients& rival : began.rivals) {
+    WarmStart start{began, std::vector<double>(cells, std::log(rival.reduced_scattering))};
+    start.cell_values.resize(2 * cells, std::log(rival.absorption));
+    auto end = minimise(start);
+    if (!end) return end.error();
+    solves += end->report.solves;
+    if (end->state.at.value >= best.state.at.value) continue;
+    best = *std::move(end);
+    outdone = true;
+  }
+  best.report.solves = solves;
+  return outdone;
+}
+
 }  // namespace
 
 Result<WarmStart> coarse_start(const ChannelProblem& problem,
                                const Block& coarse,
                                const InverseOptions& options,
                                const std::optional<WarmStart>& from,
+                               bool try_rivals,
                                diffusion::FluenceSolver& solver,
                                const Clock& clock,
                                std::stop_token stop) {
   const Block& fine = problem.block;
   const ChannelProblem restricted_problem = coarsened(problem, coarse);
   const InverseOptions restricted_options = coarse_options(options);
-  ChannelSolver below(restricted_problem,
-                      restricted_options,
-                      Parametrization::full(coarse),
-                      solver,
-                      clock,
-                      {[](const ChannelReport&) {}, [](const ChannelProgress&) { return ok(); }});
-  if (from) {
-    below.start_from(
-        {from->homogeneous, transferred(restricted, fine, coarse, from->cell_values), 0});
-  }
-  auto progress = below.run(std::nullopt, std::move(stop));
-  if (!progress)
-    return progress.error().in(fmt::format("{} x {} x {} cells", coarse.nx, coarse.ny, coarse.nz));
+  const auto minimised = [&](const std::optional<WarmStart>& start) -> Result<ChannelProgress> {
+    ChannelSolver below(restricted_problem,
+                        restricted_options,
+                        Parametrization::full(coarse),
+                        solver,
+                        clock,
+                        {[](const ChannelReport&) {}, [](const ChannelProgress&) { return ok(); }});
+    below.leave_rivals();
+    if (start) below.start_from(*start);
+    auto end = below.run(std::nullopt, stop);
+    if (!end)
+      return end.error().in(fmt::format("{} x {} x {} cells", coarse.nx, coarse.ny, coarse.nz));
+    return end;
+  };
+  std::optional<WarmStart> start;
+  if (from)
+    start = {from->homogeneous, transferred(restricted, fine, coarse, from->cell_values), 0};
+  auto progress = minimised(start);
+  if (!progress) return progress.error();
+  const auto outdone = try_rivals ? outdo(*progress, coarse, minimised) : Result<bool>(false);
+  if (!outdone) return outdone.error();
   const long solves = solves_on_finer(coarse, fine, progress->report.solves);
-  if (from && progress->report.history.back().iteration == 0) {
+  if (from && !*outdone && progress->report.history.back().iteration == 0) {
     WarmStart warm = *from;
     warm.solves += solves;
     return warm;

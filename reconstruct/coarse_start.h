@@ -17,11 +17,16 @@ namespace opaline::reconstruct {
 /// over the finer cells, so that s . y stays what it was and the first step is a good one. Solves are counted in fine
 /// ones, each coarse one for its share of the cells.
 ///
+/// Where asked, each of HomogeneousFit::rivals is a start on `coarse` as well, and the lowest end is gone on from: which
+/// of two homogeneous samples the veins are about shows once there are veins. Still coarser grids have errors larger than
+/// what tells them apart.
+///
 /// `from`, on the fine grid, replaces the homogeneous fit. Errors: ChannelSolver's.
 Result<ChannelSolver::WarmStart> coarse_start(const ChannelProblem& problem,
                                               const Block& coarse,
                                               const InverseOptions& options,
                                               const std::optional<ChannelSolver::WarmStart>& from,
+                                              bool try_rivals,
                                               diffusion::FluenceSolver& solver,
                                               const Clock& clock,
                                               std::stop_token stop);

@@ -18,6 +18,12 @@ namespace {
 
 using Logs = Eigen::Vector2d;  // log sigma_s', log sigma_a
 
+Logs logs_of(double reduced_scattering, double absorption) {
+  return {std::log(reduced_scattering), std::log(absorption)};
+}
+
+Logs logs_of(const HomogeneousFit& fit) { return logs_of(fit.reduced_scattering, fit.absorption); }
+
 constexpr int kMaxIterations = 20;
 constexpr int kMaxDampings = 10;  // a factor of ten each
 // Step of the central differences in a logarithm: truncation 1e-4 of them, the solves' tolerance 1e-3.
@@ -30,6 +36,7 @@ constexpr double kUnexplained = 0.25;  // of the data's power
 constexpr double kMuchLower = 0.25;    // times
 constexpr double kFarAbove = 2.0;      // times
 constexpr double kSameEnd = 0.05;      // apart, of the logarithms
+constexpr double kOtherEnd = 0.2;      // of log sigma_s': absorption alone may lie in a flat valley
 constexpr int kScoutIterations = 4;
 constexpr std::size_t kSketchCells = 20000;  // the largest grid that a start is sought on
 constexpr double kSecant =
@@ -111,14 +118,17 @@ class Fit {
   // From the best absorption, 0.0003 to 0.1 of scattering, of each optical thickness, the lowest end: neither the table nor
   // the first steps tell which that is. A way that joins an earlier one's end, or stays far above it, is left.
   Result<HomogeneousFit> from_best_of(std::initializer_list<double> depths) {
-    HomogeneousFit best = unexplained();
+    std::vector<HomogeneousFit> ends{unexplained()};  // the best of them first
     for (const double depth : depths) {
       const auto start = best_absorption(depth);
       if (!start) return start.error();
-      auto end = from(*start, best);
+      auto end = from(*start, ends.front());
       if (!end) return end;
-      if (end->chi_squared < best.chi_squared) best = *std::move(end);
+      const bool lowest = end->chi_squared < ends.front().chi_squared;
+      ends.insert(lowest ? ends.begin() : ends.end(), *std::move(end));
     }
+    HomogeneousFit best = ends.front();
+    best.rivals = rivals(std::move(ends));
     best.solves = objective_.solves();
     return best;
   }
@@ -174,9 +184,25 @@ class Fit {
   }
 
  private:
+  // Of the first one, which is the best.
+  static std::vector<StartCoefficients> rivals(std::vector<HomogeneousFit> ends) {
+    std::ranges::sort(ends, {}, &HomogeneousFit::chi_squared);
+    std::vector<Logs> known{logs_of(ends.front())};
+    std::vector<StartCoefficients> found;
+    for (const HomogeneousFit& end : ends) {
+      if (!(end.chi_squared <= kFarAbove * ends.front().chi_squared)) break;
+      const bool other = std::ranges::all_of(
+          known, [&end](const Logs& k) { return std::abs(k[0] - logs_of(end)[0]) > kOtherEnd; });
+      if (!other) continue;
+      known.push_back(logs_of(end));
+      found.push_back({end.reduced_scattering, end.absorption});
+    }
+    return found;
+  }
+
   // By central differences; one-sided in absorption where there is no room below.
   Result<Slopes> slopes_at(const HomogeneousFit& fit) {
-    const Logs logs(std::log(fit.reduced_scattering), std::log(fit.absorption));
+    const Logs logs = logs_of(fit);
     Slopes slopes(static_cast<Eigen::Index>(problem_.camera.size() * problem_.illuminations.size()),
                   2);
     const double step =
@@ -245,8 +271,7 @@ class Fit {
 
   static bool loses(const State& at, const HomogeneousFit& rival, int iteration) {
     if (!std::isfinite(rival.chi_squared)) return false;
-    const Logs end(std::log(rival.reduced_scattering), std::log(rival.absorption));
-    if ((at.logs - end).cwiseAbs().maxCoeff() < kSameEnd) return true;
+    if ((at.logs - logs_of(rival)).cwiseAbs().maxCoeff() < kSameEnd) return true;
     return iteration >= kScoutIterations && at.r.squaredNorm() > kFarAbove * rival.chi_squared;
   }
 
@@ -313,10 +338,6 @@ Result<HomogeneousFit> sketched(Fit& sketch) {
   return fit;
 }
 
-Logs logs_of(double reduced_scattering, double absorption) {
-  return {std::log(reduced_scattering), std::log(absorption)};
-}
-
 // From a grid of half as many cells along each axis, where there are many, and so on down.
 Result<HomogeneousFit> fit_down_to(const ChannelProblem& problem,
                                    const InverseOptions& options,
@@ -330,7 +351,8 @@ Result<HomogeneousFit> fit_down_to(const ChannelProblem& problem,
   if (!coarse) return sketched(fit);
   auto below = fit_down_to(coarsened(problem, *coarse), options, solver, stop);
   if (!below) return below;
-  auto found = fit.from(logs_of(below->reduced_scattering, below->absorption));
+  auto found = fit.from(logs_of(*below));
+  if (found) found->rivals = std::move(below->rivals);
   if (found && !fit.explains(*found)) found = sketched(fit);
   if (found) found->solves += solves_on_finer(*coarse, problem.block, below->solves);
   return found;
@@ -354,7 +376,7 @@ Result<HomogeneousFit> refine_homogeneous(const ChannelProblem& problem,
                                           diffusion::FluenceSolver& solver,
                                           std::stop_token stop) {
   Fit all(problem, options, solver, std::move(stop));
-  auto fit = all.from(logs_of(start.reduced_scattering, start.absorption));
+  auto fit = all.from(logs_of(start));
   if (!fit) return fit;
   if (auto added = all.add_intervals(*fit, options.model_error); !added) return added.error();
   fit->solves += start.solves;

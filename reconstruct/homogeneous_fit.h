@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "base/result.h"
 #include "reconstruct/inverse_options.h"
@@ -24,8 +25,11 @@ struct HomogeneousFit {
   int iterations = 0;
   long solves = 0;  ///< for one right-hand side
   /// Only where the homogeneous sample is the answer.
-  std::optional<Interval> reduced_scattering_interval;
-  std::optional<Interval> absorption_interval;
+  std::optional<Interval> reduced_scattering_interval = {};
+  std::optional<Interval> absorption_interval = {};
+  /// Other minima, at most twice as high: where veins make most of chi^2, homogeneous samples do not tell which of them
+  /// the veins are about (reconstruct/coarse_start.h does). Lowest first.
+  std::vector<StartCoefficients> rivals = {};
 };
 
 /// Fits (log sigma_s', log sigma_a) of a homogeneous block by Levenberg-Marquardt with central

@@ -116,6 +116,18 @@ void print(const Dataset& dataset, const std::string& name, const std::vector<La
       "posterior.tightening_top2mm_of_shape", name, std::sqrt(top.shape / top.variance), "x");
 }
 
+/// The estimate moved to the posterior's mean; diffusion and absorption leave room for scattering.
+ChannelCoefficients moved(const ChannelCoefficients& estimate,
+                          const reconstruct::LogFields& shift) {
+  ChannelCoefficients at = estimate;
+  for (std::size_t i = 0; i < at.absorption.size(); ++i) {
+    const double total = extinction(estimate, i) * std::exp(-shift.diffusion[i]);
+    at.absorption[i] = std::min(at.absorption[i] * std::exp(shift.absorption[i]), 0.5 * total);
+    at.reduced_scattering[i] = total - at.absorption[i];
+  }
+  return at;
+}
+
 void print_budget(const std::string& name, const reconstruct::ErrorBudget& budget) {
   print_figure("budget.measured", name, budget.measured, "1");
   print_figure("budget.sum", name, budget.sum(), "1");
@@ -127,12 +139,12 @@ void print_budget(const std::string& name, const reconstruct::ErrorBudget& budge
 
 }  // namespace
 
-Result<void> print_posterior(const std::string& name,
-                             const Dataset& dataset,
-                             const Material& truth,
-                             const reconstruct::InverseResult& result,
-                             const reconstruct::InverseOptions& options,
-                             reconstruct::diffusion::FluenceSolver& solver) {
+Result<Material> print_posterior(const std::string& name,
+                                 const Dataset& dataset,
+                                 const Material& truth,
+                                 const reconstruct::InverseResult& result,
+                                 const reconstruct::InverseOptions& options,
+                                 reconstruct::diffusion::FluenceSolver& solver) {
   const SystemClock clock;
   double seconds = 0.0;
   long solves = 0;
@@ -143,6 +155,7 @@ Result<void> print_posterior(const std::string& name,
   std::vector<Layer> absorption(layer_count);
   std::vector<Layer> diffusion_mean(layer_count);
   std::vector<Layer> absorption_mean(layer_count);
+  Material mean = result.material;
   for (int channel = 0; channel < kColorChannels; ++channel) {
     const auto c = static_cast<std::size_t>(channel);
     const ChannelCoefficients& is = result.material.channels[c];
@@ -174,6 +187,7 @@ Result<void> print_posterior(const std::string& name,
     }
     add(dataset, by_diffusion, known->deviation.diffusion, known->diffusion, diffusion);
     add(dataset, by_absorption, known->deviation.absorption, known->absorption, absorption);
+    mean.channels[c] = moved(is, known->shift);
     const auto by_k = centred(by_diffusion, known->deviation.diffusion, known->shift.diffusion);
     const auto by_a = centred(by_absorption, known->deviation.absorption, known->shift.absorption);
     add(dataset, by_k.error, by_k.deviation, known->diffusion, diffusion_mean);
@@ -195,7 +209,7 @@ Result<void> print_posterior(const std::string& name,
   const auto budget =
       reconstruct::error_budget(dataset, result.predicted, *grid, held_out_variance);
   if (budget) print_budget(name, *budget);
-  return ok();
+  return mean;
 }
 
 }  // namespace opaline::bench

@@ -26,11 +26,13 @@ namespace opaline::bench {
 ///
 ///   budget.measured, .sum, ...   reconstruct/error_budget.h
 ///   posterior.solves, .seconds   for one right-hand side and channel; all channels
-Result<void> print_posterior(const std::string& name,
-                             const Dataset& dataset,
-                             const Material& truth,
-                             const reconstruct::InverseResult& result,
-                             const reconstruct::InverseOptions& options,
-                             reconstruct::diffusion::FluenceSolver& solver);
+///
+/// Returns the posterior's mean.
+Result<Material> print_posterior(const std::string& name,
+                                 const Dataset& dataset,
+                                 const Material& truth,
+                                 const reconstruct::InverseResult& result,
+                                 const reconstruct::InverseOptions& options,
+                                 reconstruct::diffusion::FluenceSolver& solver);
 
 }  // namespace opaline::bench

@@ -50,7 +50,19 @@ class CoarseStart : public testing::Test {
 
   Result<ChannelSolver::WarmStart> start(const ChannelProblem& problem,
                                          const std::optional<ChannelSolver::WarmStart>& from) {
-    return coarse_start(problem, *coarser_block(kBlock), {}, from, *solver_, clock_, {});
+    return coarse_start(
+        problem, *coarser_block(kBlock), {}, from, /*try_rivals=*/true, *solver_, clock_, {});
+  }
+
+  static ChannelSolver::WarmStart constant(const HomogeneousFit& fit) {
+    const std::size_t cells = kBlock.cell_count();
+    return {fit,
+            to_parameters({std::vector<double>(cells, fit.absorption),
+                           std::vector<double>(cells, fit.reduced_scattering)})};
+  }
+
+  double chi_squared(const ChannelProblem& problem, const ChannelSolver::WarmStart& warm) {
+    return Objective(problem, *solver_, {}).evaluate(warm.cell_values, {})->chi_squared;
   }
 
   std::unique_ptr<diffusion::FluenceSolver> solver_ = diffusion::make_reference_solver();
@@ -71,13 +83,21 @@ TEST_F(CoarseStart, BringsWhatTheCoarseGridFoundToTheFineOne) {
   const ChannelProblem problem = problem_of(0.01);
   const auto warm = start(problem, std::nullopt);
   ASSERT_TRUE(warm) << warm.error().message;
-  Objective objective(problem, *solver_, {});
-  const auto homogeneous = to_parameters(
-      {std::vector<double>(kBlock.cell_count(), warm->homogeneous.absorption),
-       std::vector<double>(kBlock.cell_count(), warm->homogeneous.reduced_scattering)});
-  EXPECT_LT(objective.evaluate(warm->cell_values, {})->chi_squared,
-            objective.evaluate(homogeneous, {})->chi_squared);
+  EXPECT_LT(chi_squared(problem, *warm), chi_squared(problem, constant(warm->homogeneous)));
   EXPECT_FALSE(warm->pairs.empty());
+}
+
+// From a block that no light comes through there is no way down.
+TEST_F(CoarseStart, GoesOnFromTheRivalThatTheVeinsAreAbout) {
+  const ChannelProblem problem = problem_of(0.01);
+  HomogeneousFit dark{.reduced_scattering = 60.0, .absorption = 5.0};
+  const auto alone = start(problem, constant(dark));
+  dark.rivals = {{30.0, 9.0}, {1.0, 0.02}};
+  const auto one_of_three = start(problem, constant(dark));
+  ASSERT_TRUE(alone && one_of_three);
+  EXPECT_LT(20.0 * chi_squared(problem, *one_of_three), chi_squared(problem, *alone));
+  EXPECT_NEAR(one_of_three->cell_values.front(), 0.0, 0.5);
+  EXPECT_GT(one_of_three->solves, alone->solves);
 }
 
 }  // namespace

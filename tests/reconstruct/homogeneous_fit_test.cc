@@ -162,6 +162,41 @@ TEST(HomogeneousFit, EndsInTheLowerOfTwoMinima) {
     }
 }
 
+// Where a checkerboard that no homogeneous block makes is most of chi^2, the other minimum is no more than twice as high.
+TEST(HomogeneousFit, NamesTheOtherMinimumThatThePicturesHardlyRuleOut) {
+  const InverseOptions options;
+  const Dataset dataset = testing_support::make_synthetic_dataset(
+      {.block = {8, 8, 8, 0.75, 0.75, 0.75}, .regions = 2, .heterogeneous = false});
+  const auto solver = diffusion::make_reference_solver();
+  auto problem = make_channel_problem(dataset, 0, options, Selection::kFit);
+  ASSERT_TRUE(problem) << problem.error().message;
+  const std::size_t cells = problem->block.cell_count();
+  const auto exact =
+      Objective(*problem, *solver, {1e-8, 0.0})
+          .predict({std::vector<double>(cells, 0.4), std::vector<double>(cells, 4.0)}, {});
+  ASSERT_TRUE(exact) << exact.error().message;
+  for (std::size_t m = 0; m < exact->size(); ++m) {
+    ChannelIllumination& data = problem->illuminations[m];
+    for (std::size_t x = 0; x < data.weight.size(); ++x) {
+      const double sign = (x % 8 + x / 8) % 2 == 0 ? 1.0 : -1.0;
+      data.radiance[x] = (*exact)[m][x] * (1.0 + 0.3 * sign);
+      data.weight[x] = std::pow(0.02 * (*exact)[m][x], -2.0);
+    }
+  }
+
+  const auto veined = fit_homogeneous(*problem, options, *solver, {});
+
+  ASSERT_TRUE(veined) << veined.error().message;
+  ASSERT_FALSE(veined->rivals.empty());
+  const auto& rival = veined->rivals.front();
+  problem->start = rival;
+  const auto there = fit_homogeneous(*problem, options, *solver, {});
+  ASSERT_TRUE(there) << there.error().message;
+  EXPECT_GT(there->reduced_scattering, 2.0 * veined->reduced_scattering);
+  EXPECT_GT(there->chi_squared, veined->chi_squared);
+  EXPECT_LT(there->chi_squared, 2.0 * veined->chi_squared);
+}
+
 // 120 draws of probability 0.95: 0.90 to 0.99 is two and a half standard deviations below and two above.
 TEST(HomogeneousFit, HoldsTheTruthIn95Of100IntervalsUnderNoise) {
   const auto share = Experiment({}, 0.0).coverage();
