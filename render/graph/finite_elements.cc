@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/ensure.h"
+
 namespace opaline::render {
 namespace {
 
@@ -159,8 +161,8 @@ std::vector<Lanes<double>> FiniteElements::load(std::span<const std::array<float
 }
 
 std::vector<Lanes<double>> FiniteElements::load(
-    std::span<const std::array<float, 3>> q,
-    std::span<const std::array<float, 3>> of_middles) const {
+    std::span<const std::array<float, 3>> q, std::span<const std::array<int, 6>> places_of) const {
+  ENSURE(places_of.size() == surface_.size());
   // Of the four quarters together, int q v dA / area, times 96: of a corner and of a middle, for the v of ...
   constexpr double kOwnCorner = 6.0;
   constexpr double kOtherCorner = 1.0;
@@ -177,7 +179,7 @@ std::vector<Lanes<double>> FiniteElements::load(
         const double corner = mass * (i == k ? kOwnCorner : kOtherCorner);
         const double middle = mass * (k == (i + 1) % 3 ? kMiddleAcross : kMiddleBeside);
         for (int c = 0; c < 3; ++c) {
-          sum.set(c, sum[c] + corner * q[triangle[k]][c] + middle * of_middles[edges_of_[t][k]][c]);
+          sum.set(c, sum[c] + corner * q[places_of[t][k]][c] + middle * q[places_of[t][3 + k]][c]);
         }
       }
     }

@@ -36,10 +36,11 @@ class FiniteElements {
 
   const LaneMatrix<double>& matrix() const { return matrix_; }
   std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q) const;
-  /// The same of light that is also known in the middles of the surface's edges: linear in each quarter of a triangle. What has
-  /// a kink within a triangle, as light has where it begins to graze, or curves there, is off by a quarter.
+  /// The same of light at any places: `places_of` has, for each of the triangles of surface_of(), those of its corners and of the middles of
+  /// its edges, the k-th from corner k to the next, so that the sides of a crease may differ. Linear in each quarter of a triangle: what
+  /// has a kink within a triangle, as light has where it begins to graze, or curves there, is off by a quarter.
   std::vector<Lanes<double>> load(std::span<const std::array<float, 3>> q,
-                                  std::span<const std::array<float, 3>> of_middles) const;
+                                  std::span<const std::array<int, 6>> places_of) const;
   /// The edges of the surface, by vertices of the mesh.
   const std::vector<std::array<int, 2>>& surface_edges() const { return edges_; }
   /// The edges of each of the triangles of surface_of(), the k-th from its corner k to the next.

@@ -71,15 +71,26 @@ class ElementsSubsurface final : public Subsurface {
     return places;
   }
 
+  std::size_t first_vertex_place() const override { return 0; }
+
+  std::vector<TrianglePlaces> flat_triangle_places() const override {
+    std::vector<TrianglePlaces> places = Subsurface::flat_triangle_places();
+    for (std::size_t t = 0; t < places.size(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        places[t][3 + k] = static_cast<int>(used_.size()) + elements_->edges_of_triangles()[t][k];
+      }
+    }
+    return places;
+  }
+
   DepositAt deposit_at() const override { return DepositAt::kVertices; }
 
   /// The mean over the three middles is the integral over the triangle of whatever is quadratic there.
   Values on_faces(std::span<const std::array<float, 3>> q) const override {
     Values faces;
-    for (const auto& [a, b, c] : elements_->edges_of_triangles()) {
-      const auto middles = q.subspan(used_.size());
+    for (const TrianglePlaces& at : triangle_places()) {
       auto& mean = faces.emplace_back();
-      for (int k = 0; k < 3; ++k) mean[k] = (middles[a][k] + middles[b][k] + middles[c][k]) / 3.0F;
+      for (int c = 0; c < 3; ++c) mean[c] = (q[at[3]][c] + q[at[4]][c] + q[at[5]][c]) / 3.0F;
     }
     return faces;
   }
@@ -87,7 +98,7 @@ class ElementsSubsurface final : public Subsurface {
   SolveSummary solve(std::span<const std::array<float, 3>> q,
                      std::span<const std::array<double, 3>> scattered,
                      std::stop_token stop) override {
-    std::vector<Lanes<double>> load = elements_->load(on_mesh(q), q.subspan(used_.size()));
+    std::vector<Lanes<double>> load = elements_->load(q, triangle_places());
     for (std::size_t v = 0; v < scattered.size(); ++v) {
       for (int c = 0; c < 3; ++c) load[v].set(c, load[v][c] + scattered[v][c]);
     }
@@ -95,7 +106,7 @@ class ElementsSubsurface final : public Subsurface {
   }
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
-    const SurfaceLight all = elements_->surface_light(on_mesh(q), phi_);
+    const SurfaceLight all = elements_->surface_light(on_mesh(at_vertices(q)), phi_);
     SurfaceLight light{Values(used_.size()), Values(used_.size())};
     for (std::size_t v = 0; v < used_.size(); ++v) {
       light.fluence[v] = all.fluence[used_[v]];
@@ -105,7 +116,7 @@ class ElementsSubsurface final : public Subsurface {
   }
 
  private:
-  Values on_mesh(std::span<const std::array<float, 3>> q) const {
+  Values on_mesh(const Values& q) const {
     Values all(mesh_.vertices.size());
     for (std::size_t v = 0; v < used_.size(); ++v) all[used_[v]] = q[v];
     return all;

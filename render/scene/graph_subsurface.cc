@@ -73,6 +73,8 @@ class GraphSubsurface final : public Subsurface {
     }
   }
 
+  std::size_t first_vertex_place() const override { return graph_.surface.size(); }
+
   DepositAt deposit_at() const override { return DepositAt::kTetrahedra; }
 
   Values on_faces(std::span<const std::array<float, 3>> q) const override {
@@ -103,7 +105,7 @@ class GraphSubsurface final : public Subsurface {
 
   SurfaceLight at_surface(std::span<const std::array<float, 3>> q) const override {
     const SurfaceLight light = light_of(q.first(graph_.surface.size()));
-    return with_flux(interpolated(to_vertices_, light.fluence), q.subspan(graph_.surface.size()));
+    return with_flux(interpolated(to_vertices_, light.fluence), at_vertices(q));
   }
 
  private:
@@ -133,7 +135,7 @@ class GraphSubsurface final : public Subsurface {
 
   /// J_n = (phi - S) / (2 A) of the vertices, from the light there: the fluence hardly bends where the light does, and their
   /// difference may. Fluence is not let below 0, where a fit may be beside a shadow's edge.
-  SurfaceLight with_flux(Values fluence, std::span<const std::array<float, 3>> q) const {
+  SurfaceLight with_flux(Values fluence, const Values& q) const {
     SurfaceLight light{std::move(fluence), Values(q.size())};
     for (std::size_t v = 0; v < q.size(); ++v) {
       for (int c = 0; c < 3; ++c) {

@@ -68,17 +68,22 @@ Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {
     const auto& places = bodies_[b].body->subsurface().places();
     const double ior = looks_[bodies_[b].object].ior;
     const auto& edges = bodies_[b].body->subsurface().edges();
-    body_sky_[b].resize(places.size() - edges.size());
+    const std::size_t middles = bodies_[b].body->subsurface().surface().vertices.size();
+    std::vector<float>& sky = body_sky_[b];
+    sky.resize(places.size());
     const auto passed = [ior](double cosine) { return 1.0 - fresnel_reflectance(cosine, ior); };
-    for_each(body_sky_[b].size(), team_, stop, [&](std::size_t i) {
-      body_sky_[b][i] = static_cast<float>(std::numbers::pi * share(places[i], passed));
+    for_each(sky.size(), team_, stop, [&](std::size_t i) {
+      if (i >= middles && i < middles + edges.size()) return;
+      sky[i] = static_cast<float>(std::numbers::pi * share(places[i], passed));
     });
+    for (std::size_t e = 0; e < edges.size();
+         ++e)  // the sky changes slowly, and is dear to look at
+      sky[middles + e] = 0.5F * (sky[edges[e][0]] + sky[edges[e][1]]);
     double open = 0.0;
     for (const Vec3& d : directions) open += passed(d.z);
     open *= std::numbers::pi / static_cast<double>(directions.size());
-    looks_[bodies_[b].object].sky = sky_share(bodies_[b].body->drawn(), body_sky_[b], open);
-    for (const auto& [from, to] : edges)  // the sky changes slowly, and is dear to look at
-      body_sky_[b].push_back(0.5F * (body_sky_[b][from] + body_sky_[b][to]));
+    const auto known = edges.empty() ? sky.end() : sky.begin() + static_cast<long>(middles);
+    looks_[bodies_[b].object].sky = sky_share(bodies_[b].body->drawn(), {sky.begin(), known}, open);
   }
   for (std::size_t o = 0; o < opaque_.size(); ++o) {
     if (!opaque_[o].drawn) continue;

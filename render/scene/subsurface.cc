@@ -176,11 +176,35 @@ Result<void> Subsurface::begin(const SubsurfaceSetting& setting) {
   look_at_shape();
   rest_places_ = flat_places();
   for (SurfacePlace& p : rest_places_) p.normal = smooth_normal(solid, p.place, p.normal, p.size);
+  triangle_places_ = flat_triangle_places();
+  creases_ = Creases::split(solid, surface_, rest_places_, triangle_places_);
   places_ = rest_places_;
   if (options_.method != Discretisation::kPolygrid) {
     beams_ = std::make_unique<BeamDeposit>(mesh_, optics_, setting.ior);
   }
   return ok();
+}
+
+std::vector<TrianglePlaces> Subsurface::flat_triangle_places() const {
+  const auto first = static_cast<int>(first_vertex_place());
+  std::vector<TrianglePlaces> triangles;
+  for (const auto& [a, b, c] : surface_.triangles) {
+    triangles.push_back({first + a, first + b, first + c, -1, -1, -1});
+  }
+  return triangles;
+}
+
+Subsurface::Values Subsurface::at_vertices(std::span<const std::array<float, 3>> q) const {
+  const auto own = q.subspan(first_vertex_place(), surface_.vertices.size());
+  Values values(own.begin(), own.end());
+  for (const Creases::Corner& corner : creases_.corners()) {
+    auto& mean = values[corner.vertex];
+    mean.fill(0.0F);
+    for (std::size_t i = 0; i < corner.places.size(); ++i) {
+      for (int c = 0; c < 3; ++c) mean[c] += corner.weights[i] * q[corner.places[i]][c];
+    }
+  }
+  return values;
 }
 
 void Subsurface::sample(const MaterialAt& material) {
@@ -232,6 +256,7 @@ Result<std::size_t> Subsurface::bend(const Deformation& deformation) {
   follow_anew();
   look_at_shape();
   places_ = flat_places();
+  creases_.append(surface_, places_);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const SurfacePlace& rest = rest_places_[i];
     const Vec3 smooth = deformation.normal(rest.place, rest.normal, kBendingStep * rest.size);

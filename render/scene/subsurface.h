@@ -13,6 +13,7 @@
 #include "render/graph/optics.h"
 #include "render/mesh/signed_distance.h"
 #include "render/scene/beam_deposit.h"
+#include "render/scene/creases.h"
 #include "render/scene/first_scattering.h"
 #include "render/scene/scene.h"
 #include "render/scene/surfaces.h"
@@ -98,6 +99,7 @@ class Subsurface {
   const Report& report() const { return report_; }
   /// Where q is asked for. Of elements: the vertices of surface(), then the middles of edges(). Of a graph the middles of its
   /// triangles, of a lattice its boundary nodes; then the vertices.
+  /// Last, for each triangle at a crease, what it sees of that in place of those (render/scene/creases.h).
   const std::vector<SurfacePlace>& places() const { return places_; }
   /// Of elements the edges of surface(), by its vertices; else none.
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
@@ -136,6 +138,14 @@ class Subsurface {
   virtual std::vector<Vec3> nodes() const = 0;
   virtual std::vector<SurfacePlace> flat_places() const = 0;
   virtual std::vector<std::array<int, 2>> edges_between() const { return {}; }
+  /// The number of the first vertex's place; the others' follow.
+  virtual std::size_t first_vertex_place() const = 0;
+  /// Of flat_places() by triangles of surface(); here without middles.
+  virtual std::vector<TrianglePlaces> flat_triangle_places() const;
+  /// The same of places().
+  const std::vector<TrianglePlaces>& triangle_places() const { return triangle_places_; }
+  /// Of q, at the vertices; at a crease the mean of its sides.
+  Values at_vertices(std::span<const std::array<float, 3>> q) const;
   /// The unknowns that light scatters into.
   virtual DepositAt deposit_at() const = 0;
   /// q in the middles of the faces of the surface, in the order of beams()->faces().
@@ -189,6 +199,8 @@ class Subsurface {
   std::vector<Vec3> rest_;   // of mesh_'s vertices
   std::vector<Vec3> nodes_;  // at rest
   std::vector<SurfacePlace> rest_places_;
+  std::vector<TrianglePlaces> triangle_places_;
+  Creases creases_;
   std::vector<bool> inverted_corners_;
   SurfaceLight lit_;
   std::unique_ptr<BeamDeposit> beams_;

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
 
+#include "tests/render/mesh_samples.h"
 #include "tests/render/scene/exact_sphere.h"
+#include "tests/support/temporary_directory.h"
 
 namespace opaline::render {
 namespace {
@@ -137,6 +140,41 @@ TEST(SceneRenderer, ASphereInAnEnvironmentShowsTheExactRadiance) {
 
 // A disc of radiance L before a plane across its axis: E = pi L r^2 / (r^2 + h^2) below its middle, and as a point far away.
 // 256 points of equal area leave an error of the order of 1 / 256.
+// The floor hides the sky from the bottom, and from the sides' lower half; seen from above, all four sides are alike.
+TEST(SceneRenderer, ACubeOnAFloorIsLitFromAllFourSidesAlike) {
+  const testing::TemporaryDirectory directory;
+  ObjectOptions cube = sphere();
+  cube.shape.name.clear();
+  cube.shape.file = directory.path() / "cube.obj";
+  {
+    std::ofstream file(cube.shape.file);
+    const TriangleMesh mesh = cube_mesh(20.0, {-10.0, -10.0, -10.0});
+    for (const Vec3& p : mesh.vertices) file << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+    for (const auto& t : mesh.triangles)
+      file << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  }
+  cube.material.absorption = {0.01, 0.01, 0.01};
+  Scene scene = scene_of({cube, floor_at(-10.01, 200.0)});
+  scene.camera.position = {0.0, 0.0, 60.0};
+  scene.camera.up = {0.0, 1.0, 0.0};
+  scene.camera.field_of_view_degrees = 20.0;  // 17.6 mm of the face
+  scene.environment.radiance = {1.0, 1.0, 1.0};
+  scene.diffusion.directions = 0;
+  scene.diffusion.tetrahedra = 8e3;  // vertices lie on the edges
+  const auto picture = drawn(scene);
+  ASSERT_TRUE(picture) << picture.error().message;
+  const double middle = picture->at(48, 48, 1);
+  EXPECT_GT(middle, 0.0);
+  double worst = 0.0;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const double turned = picture->at(y, 95 - x, 1);
+      worst = std::max(worst, std::abs(picture->at(x, y, 1) - turned) / middle);
+    }
+  }
+  EXPECT_LT(worst, 0.04);  // 64 directions of the sky a place
+}
+
 TEST(SceneRenderer, AMattePlaneUnderADiscShowsItsClosedForm) {
   for (const double height : {4.0, 12.0, 60.0}) {
     Scene scene = scene_of({floor_at(0.0, 60.0)});
