@@ -96,6 +96,9 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.number(
       {"tolerance", "relative residual of the solution"}, d.tolerance, Range::between(1e-12, 0.1));
   fields.whole({"max_iterations", ""}, d.max_iterations, Range::between(1, 100000));
+  fields.whole({"levels", "of the multiresolution hierarchy, at most; 1: smoothing alone"},
+               d.levels,
+               Range::between(1, 20));
   fields.whole({"corrections", "at most, of a graph's links that lean on their faces; 0: none"},
                d.corrections,
                Range::between(0, 100));

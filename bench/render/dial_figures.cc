@@ -74,6 +74,19 @@ bool measure_dials(const std::string& plot) {
                      reference,
                      team,
                      points);
+  for (const int levels : {1, 2, 3})  // of the hierarchy; all it has are above
+    measure_dial(fmt::format("{} level{}", levels, levels > 1 ? "s" : ""),
+                 fmt::format("elements-140k-K0.1-L{}", levels),
+                 *solid,
+                 {.method = kElements,
+                  .directions = 0,
+                  .spacing_mm = render::spacing_for(volume, 1.4e5),
+                  .interior_growth = 0.1,
+                  .max_iterations = 3000,
+                  .levels = levels},
+                 reference,
+                 team,
+                 points);
   for (const FrontPoint& point : front_of(points))
     print_figure("render.dial_front", point.name, point.error, "1");
   if (plot.empty()) return true;

@@ -12,8 +12,6 @@ namespace {
 using reconstruct::diffusion::Boundary;
 using reconstruct::diffusion::SolveSummary;
 
-constexpr HierarchyOptions kElementHierarchy{.first_rings = 1};
-
 class ElementsSubsurface final : public Subsurface {
  public:
   ElementsSubsurface(TetMesh mesh, const SubsurfaceSetting& setting)
@@ -23,8 +21,9 @@ class ElementsSubsurface final : public Subsurface {
 
   Result<void> begin_with(const SubsurfaceSetting& setting) {
     if (auto begun = begin(setting); !begun) return begun;
-    solver_ = std::make_unique<FreshHierarchy<double>>(
-        elements_->matrix(), kElementHierarchy, setting.team);
+    const HierarchyOptions hierarchy{.first_rings = 1, .most_levels = options_.levels};
+    solver_ =
+        std::make_unique<FreshHierarchy<double>>(elements_->matrix(), hierarchy, setting.team);
     return ok();
   }
 

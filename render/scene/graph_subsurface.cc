@@ -35,8 +35,8 @@ class GraphSubsurface final : public Subsurface {
         lean_ = std::make_unique<LeaningLinks<T>>(mesh_, graph_, boundary_, setting.team);
     }
     if (auto begun = begin(setting); !begun) return begun;
-    solver_ =
-        std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), HierarchyOptions{}, setting.team);
+    const HierarchyOptions hierarchy{.most_levels = options_.levels};
+    solver_ = std::make_unique<FreshHierarchy<T>>(diffusion_.matrix(), hierarchy, setting.team);
     return ok();
   }
 

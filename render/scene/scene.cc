@@ -146,6 +146,9 @@ Result<void> check_diffusion(const DiffusionOptions& diffusion) {
     return invalid_argument("tolerance: expected 1e-12 to 0.1");
   }
   if (diffusion.max_iterations < 1) return invalid_argument("max_iterations: expected at least 1");
+  if (diffusion.levels < 1 || diffusion.levels > 20) {
+    return invalid_argument("levels: expected 1 to 20");
+  }
   if (!(diffusion.spacing_mm >= 0.0)) return invalid_argument("spacing: expected at least 0 mm");
   if (!(diffusion.tetrahedra >= 100.0 && diffusion.tetrahedra <= 2e7)) {
     return invalid_argument("tetrahedra: expected 100 to 2e7");

@@ -153,6 +153,8 @@ struct DiffusionOptions {
   double tolerance = 1e-4;                         ///< relative residual
   int corrections = 8;  ///< of a graph's links that lean, at most so many a solution; 0: none
   int max_iterations = 300;
+  int levels =
+      20;  ///< of the multiresolution hierarchy, at most; 1: conjugate gradients with smoothing alone
   reconstruct::diffusion::BoundaryModel boundary =
       reconstruct::diffusion::BoundaryModel::kTwoMoment;
 };

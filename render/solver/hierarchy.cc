@@ -13,7 +13,6 @@ namespace {
 
 constexpr int kParallelRows = 4000;  // fewer are not worth waking anybody
 constexpr double kSmoothedShare = 0.25;
-constexpr std::size_t kMostLevels = 20;
 
 template <class Work>
 void over_rows(int rows, ThreadTeam& team, const Work& work) {
@@ -243,9 +242,10 @@ Hierarchy<T>::Hierarchy(const LaneMatrix<T>& finest, const HierarchyOptions& opt
     : options_(options), rough_(rough_entries(finest)) {
   const LaneMatrix<T>* a = &finest;
   double strength = options.strength;
-  levels_.reserve(kMostLevels);
+  const auto most = static_cast<std::size_t>(options.most_levels);
+  levels_.reserve(most);  // the next level's matrix is read from the one before
   levels_.emplace_back(*a, options.smoothing_steps);
-  while (a->rows() > options.coarsest_rows && levels_.size() < kMostLevels) {
+  while (a->rows() > options.coarsest_rows && levels_.size() < most) {
     const Groups groups = aggregate(*a, strength, levels_.size() == 1 ? options.first_rings : 1);
     if (groups.count * 10 > a->rows() * 9) break;  // nothing couples any more
     Level& fine = levels_.back();

@@ -15,6 +15,8 @@ struct HierarchyOptions {
   int first_rings = 2;      ///< reach of the finest groups; coarser ones reach one ring
   int smoothing_steps = 1;  ///< Chebyshev steps before and after each correction; >= 1
   int coarsest_rows = 160;  ///< solved directly
+  int most_levels =
+      20;  ///< >= 1; the last one of fewer is smoothed, or solved directly where it is small
 };
 
 /// A multiresolution hierarchy of a diffusion matrix with its interpolation,

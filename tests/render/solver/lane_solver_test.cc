@@ -106,6 +106,27 @@ TEST(LaneSolver, IterationsHardlyGrowWithTheNumberOfNodes) {
   }
 }
 
+TEST(LaneSolver, EveryLevelOfTheHierarchySparesIterationsAndNoneIsNeededForTheSolution) {
+  ThreadTeam team(2);
+  const auto a = grid<double>(32, 1.0, 1e-3);
+  const auto b = random_field<double>(a.rows(), 2);
+  std::vector<int> iterations;
+  std::vector<double> first;
+  for (const int levels : {1, 2, 20}) {
+    LaneSolver<double> solver(a, {.most_levels = levels}, team);
+    EXPECT_LE(solver.hierarchy().levels(), levels);
+    auto x = dark<double>(a.rows());
+    const auto summary = solver.solve(b, x, {.tolerance = 1e-9, .max_iterations = 2000}, {});
+    ASSERT_EQ(summary.termination, Termination::kConverged) << summary.message;
+    iterations.push_back(summary.iterations);
+    first.push_back(x[0][0]);
+  }
+  EXPECT_GT(iterations[0], iterations[1]);
+  EXPECT_GE(iterations[1], iterations[2]);
+  EXPECT_GT(iterations[0], 3 * iterations[2]);
+  EXPECT_NEAR(first[0], first[2], 1e-5 * std::abs(first[2]));
+}
+
 TEST(LaneSolver, ContrastsOfAMillionConverge) {
   ThreadTeam team(2);
   for (const double contrast : {1e-6, 1e6}) {
