@@ -15,8 +15,9 @@ namespace opaline::reconstruct {
 
 /// One setting to be measured, and the dial by which it differs from the settings as given.
 struct TradeoffSetting {
-  std::string
-      dial;  ///< "given" | "regions and grid" | "tolerance" | "iterations" | "optimiser" | "back end"
+  /// "given" | "regions and grid" | "tolerance" | "iterations" | "optimiser" | "back end" | "precision" |
+  /// "grid correction" | "quality NAME", all of its dials at once
+  std::string dial;
   Reduction reduction;
   InverseOptions options;
   diffusion::Precision precision = diffusion::Precision::kSingle;  ///< of the host back end

@@ -18,17 +18,39 @@ using Value = std::function<double(const TradeoffPoint&)>;
 
 constexpr int kWidth = 860;
 constexpr int kHeight = 420;
-constexpr std::array<std::pair<std::string_view, const char*>, 7> kDials{
+constexpr std::string_view kQuality = "quality ";  // and its name
+constexpr const char* kOther = "#17becf";          // a dial that is not among these
+constexpr std::array<std::pair<std::string_view, const char*>, 8> kDials{
     {{"given", "#000000"},
      {"regions and grid", "#1f77b4"},
      {"tolerance", "#d62728"},
      {"iterations", "#2ca02c"},
      {"precision", "#ff7f0e"},
      {"optimiser", "#9467bd"},
-     {"back end", "#8c564b"}}};
+     {"back end", "#8c564b"},
+     {"grid correction", "#e377c2"}}};
+
+/// What a point is drawn under.
+std::string_view group_of(const TradeoffPoint& p) {
+  const std::string_view dial = p.setting.dial;
+  return dial.starts_with(kQuality) ? kQuality.substr(0, kQuality.size() - 1) : dial;
+}
+
+/// The dials that are turned, those known first.
+std::vector<std::pair<std::string_view, const char*>> groups_of(const Points& points) {
+  std::vector<std::pair<std::string_view, const char*>> groups(kDials.begin(), kDials.end());
+  for (const TradeoffPoint* p : points) {
+    const bool known = std::ranges::any_of(
+        groups, [dial = group_of(*p)](const auto& group) { return group.first == dial; });
+    if (!known) groups.emplace_back(group_of(*p), kOther);
+  }
+  return groups;
+}
 
 std::string short_name(const TradeoffPoint& p) {
   const auto& s = p.setting;
+  if (s.dial.starts_with(kQuality)) return s.dial.substr(kQuality.size());
+  if (s.dial == "grid correction") return "corrected";
   if (s.dial == "tolerance") return fmt::format("{:g}", s.options.tolerance);
   if (s.dial == "iterations") return fmt::format("{} it.", s.options.max_iterations);
   if (s.dial == "precision") return std::string(to_string(s.precision));
@@ -73,10 +95,10 @@ CurvePlot plot_of(const Points& points, std::string y_label, const Value& value)
   plot.log_x = true;
   plot.width = kWidth;
   plot.height = kHeight;
-  for (const auto& [dial, color] : kDials) {
+  for (const auto& [dial, color] : groups_of(points)) {
     Points some;
     std::ranges::copy_if(points, std::back_inserter(some), [dial = dial](const TradeoffPoint* p) {
-      return p->setting.dial == dial;
+      return group_of(*p) == dial;
     });
     if (!some.empty()) plot.series.push_back(series_of(some, dial, color, value));
   }
