@@ -12,6 +12,7 @@ using reconstruct::diffusion::Medium;
 
 constexpr int kLanes = 16;  // right-hand sides side by side, where they are batched
 constexpr int kLook = 20;   // sweeps between two looks at the error
+constexpr int kLooksARound = 20;
 constexpr int kCoarseSweeps = 400;
 constexpr int kMostSweeps = 200000;
 
@@ -195,16 +196,36 @@ void sweep(Grid& grid, int count) {
   }
 }
 
-FieldBatch fluence_of(const Grid& grid) {
-  FieldBatch x(grid.medium.block.cell_count(), grid.lanes);
+/// What `found` and the sweeps since amount to.
+FieldBatch fluence_of(const Grid& grid, const FieldBatch& found) {
+  FieldBatch x = found;
   for (int m = 0; m < grid.lanes; ++m)
-    for (std::size_t c = 0; c < x.cells; ++c) x.field(m)[c] = grid.u[c * grid.lanes + m];
+    for (std::size_t c = 0; c < x.cells; ++c) x.field(m)[c] += grid.u[c * grid.lanes + m];
   return x;
 }
 
+/// From here on the grid's sweeps are for what is missing at `found`.
+void sweep_the_rest(const ForwardCase& problem,
+                    const ExactMatrix& matrix,
+                    const FieldBatch& found,
+                    int first,
+                    Grid& grid) {
+  std::vector<double> rest(found.cells);
+  for (int m = 0; m < grid.lanes; ++m) {
+    matrix.residual(problem.b.field(first + m), found.field(m), rest.data());
+    for (std::size_t c = 0; c < found.cells; ++c)
+      grid.b[c * grid.lanes + m] = static_cast<float>(rest[c]);
+  }
+  std::fill(grid.u.begin(), grid.u.end(), 0.0F);
+}
+
 /// Illuminations first ... first + lanes.
-RelaxationRun relax(
-    const ForwardCase& problem, const FieldBatch& exact, double error, int first, int lanes) {
+RelaxationRun relax(const ForwardCase& problem,
+                    const ExactMatrix& matrix,
+                    const FieldBatch& exact,
+                    double error,
+                    int first,
+                    int lanes) {
   FieldBatch wanted(exact.cells, lanes);
   std::copy_n(exact.field(first), wanted.values.size(), wanted.values.begin());
   std::vector<float> light(problem.b.cells * lanes);
@@ -228,29 +249,38 @@ RelaxationRun relax(
     sweep(grids[level], kCoarseSweeps);
     scatter(grids[level], grids[level - 1]);
   }
-  do {
-    sweep(grids.front(), kLook);
-    run.sweeps += kLook;
-    stop_clock();
-    run.error = front_face_error(problem, fluence_of(grids.front()), wanted);
+  Grid& finest = grids.front();
+  FieldBatch found(exact.cells, lanes);
+  stop_clock();
+  for (int look = 1;; ++look) {
     start = std::chrono::steady_clock::now();
-  } while (run.error > error && run.sweeps < kMostSweeps);
+    sweep(finest, kLook);
+    stop_clock();
+    run.sweeps += kLook;
+    FieldBatch now = fluence_of(finest, found);
+    run.error = front_face_error(problem, now, wanted);
+    if (run.error <= error || run.sweeps >= kMostSweeps) break;
+    if (look % kLooksARound != 0) continue;
+    found = std::move(now);
+    sweep_the_rest(problem, matrix, found, first, finest);
+  }
   return run;
 }
 
 }  // namespace
 
 RelaxationRun run_relaxation(const ForwardCase& problem, const FieldBatch& exact, double error) {
-  return relax(problem, exact, error, 0, kLanes);
+  return relax(problem, ExactMatrix(problem.medium), exact, error, 0, kLanes);
 }
 
 RelaxationRun run_published_relaxation(const ForwardCase& problem,
                                        const FieldBatch& exact,
                                        double error,
                                        int count) {
+  const ExactMatrix matrix(problem.medium);
   RelaxationRun all;
   for (int first = 0; first < count; ++first) {
-    const RelaxationRun one = relax(problem, exact, error, first, 1);
+    const RelaxationRun one = relax(problem, matrix, exact, error, first, 1);
     all.seconds += one.seconds * problem.b.count / count;
     all.sweeps = std::max(all.sweeps, one.sweeps);
     all.error = std::max(all.error, one.error);
