@@ -144,13 +144,24 @@ class Tracer {
   Vec3 entry_direction(Vec3 normal, SplitMix& random) const {
     const Vec3 inwards = normal * -1.0;
     if (options_.entry == TetEntry::kDiffuse) {
+      const double sine_squared = passing_sine_squared(random) / (solid_.ior * solid_.ior);
       return around(
-          inwards, std::sqrt(random.uniform()), 2.0 * std::numbers::pi * random.uniform());
+          inwards, std::sqrt(1.0 - sine_squared), 2.0 * std::numbers::pi * random.uniform());
     }
     const Vec3 d = normalized(options_.direction);
     const double cosine = dot(d, inwards);
     const Vec3 tangent = (d - inwards * cosine) * (1.0 / solid_.ior);
     return normalized(tangent + inwards * std::sqrt(std::max(0.0, 1.0 - dot(tangent, tangent))));
+  }
+
+  /// Outside: of light from everywhere that is not mirrored.
+  double passing_sine_squared(SplitMix& random) const {
+    double cosine_squared = random.uniform();
+    while (solid_.ior != 1.0 &&
+           random.uniform() < reflectance(std::sqrt(cosine_squared), 1.0, solid_.ior)) {
+      cosine_squared = random.uniform();
+    }
+    return 1.0 - cosine_squared;
   }
 
   /// From one collision, or the surface, to the next.

@@ -29,7 +29,7 @@ struct TetFace {
 
 /// How light goes on behind the face through which it enters.
 enum class TetEntry : std::uint8_t {
-  kDiffuse,  ///< with cosine-distributed directions, as light from everywhere does at a matched index
+  kDiffuse,  ///< as light does that falls on it evenly from everywhere: what Fresnel lets pass, refracted (Snell)
   kCollimated,  ///< along `direction`, refracted (Snell)
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "sim/fresnel.h"
+
 namespace opaline::sim {
 namespace {
 
@@ -115,6 +117,33 @@ TEST(TetTransport, WithoutCollisionsLightGoesStraightAndIsRefracted) {
               {.entry = TetEntry::kCollimated, .direction = {1.0, 0.0, -1.0}, .photons = 6400});
   EXPECT_NEAR(o.transmitted, std::exp(-0.1 * 5.0 * std::sqrt(2.0)), 1e-9);
   EXPECT_DOUBLE_EQ(o.unscattered, o.transmitted);
+}
+
+// What absorbs and does not scatter: of light at sin^2 = s outside, e = exp(-sigma_a d / cos) is left on each way across, so
+// (1 - R) e / (1 - R^2 e^2) of what entered leaves below, and R e times that above; the means over s have the weight 1 - R.
+TEST(TetTransport, DiffuseLightFillsTheRefractedCone) {
+  constexpr double kIor = 1.5;
+  constexpr double kDepth = 0.5;
+  constexpr int kNodes = 2000;
+  double entered = 0.0;
+  double below = 0.0;
+  double above = 0.0;
+  for (int k = 0; k < kNodes; ++k) {
+    const double s = (k + 0.5) / kNodes;
+    const double mirrored = reflectance(std::sqrt(1.0 - s), 1.0, kIor);
+    const double e = std::exp(-kDepth / std::sqrt(1.0 - s / (kIor * kIor)));
+    const double out =
+        (1.0 - mirrored) * (1.0 - mirrored) * e / (1.0 - mirrored * mirrored * e * e);
+    entered += 1.0 - mirrored;
+    below += out;
+    above += mirrored * e * out;
+  }
+  TetSolid solid = slab(120.0, 5.0, 81);
+  solid.ior = kIor;
+  const Outcome o =
+      through(solid, 0.0, kDepth / 5.0, {.entry = TetEntry::kDiffuse, .photons = 60'000});
+  EXPECT_NEAR(o.transmitted, below / entered, 0.002);  // three standard errors
+  EXPECT_NEAR(o.reflected, above / entered, 0.0015);
 }
 
 TEST(TetTransport, DoesNotDependOnThreadsAndRefusesWhatMakesNoSense) {
