@@ -41,6 +41,7 @@ class BeamDeposit {
   };
   const std::vector<Face>& faces() const { return faces_; }
   const TetMesh& mesh() const { return mesh_; }
+  double ior() const { return ior_; }
 
   struct Deposit {
     int tet = 0;

@@ -5,10 +5,13 @@
 #include <numbers>
 
 #include "base/ensure.h"
+#include "reconstruct/diffusion/fresnel.h"
 #include "render/scene/lighting.h"
 
 namespace opaline::render {
 namespace {
+
+constexpr int kConeSteps = 256;
 
 using Power = std::vector<std::array<double, 3>>;
 
@@ -22,12 +25,12 @@ void add(Power& sums, const Power& more) {
 
 double fraction(double x) { return x - std::floor(x); }
 
-/// Direction k of `count` behind a face, about +z: sin^2 theta in the k-th of as many equal strata, which is the density cos theta / pi.
-/// Where in the stratum, and the angle about z, differ from face to face as the two coordinates of the R2 sequence do.
-Vec3 direction_behind(std::size_t face, int k, int count) {
+/// Direction k of `count` behind a face, about +z, in the k-th of as many equal shares of the cone.
+/// Where in the share, and the angle about z, differ from face to face as the two coordinates of the R2 sequence do.
+Vec3 direction_behind(const RefractedCone& cone, std::size_t face, int k, int count) {
   constexpr double kPlastic = 1.32471795724474602596;  // x^3 = x + 1
   const auto f = static_cast<double>(face);
-  const double square = (k + fraction(0.5 + f / kPlastic)) / count;
+  const double square = cone.sine_squared((k + fraction(0.5 + f / kPlastic)) / count);
   const double angle =
       2.0 * std::numbers::pi * (k / std::numbers::phi + fraction(0.5 + f / (kPlastic * kPlastic)));
   const double sine = std::sqrt(square);
@@ -71,10 +74,28 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
   return std::move(parts[0]);
 }
 
+RefractedCone::RefractedCone(double ior) : ior_(ior), shares_(kConeSteps + 1, 0.0) {
+  double sum = 0.0;
+  for (int k = 0; k < kConeSteps; ++k) {
+    const double cosine = std::sqrt(1.0 - (k + 0.5) / kConeSteps);
+    sum += 1.0 - reconstruct::diffusion::fresnel_reflectance(cosine, ior);
+    shares_[k + 1] = sum;
+  }
+  for (double& share : shares_) share /= sum;
+}
+
+double RefractedCone::sine_squared(double share) const {
+  const auto above = std::upper_bound(shares_.begin() + 1, shares_.end() - 1, share);
+  const double step = static_cast<double>(above - shares_.begin() - 1) +
+                      (share - *(above - 1)) / (*above - *(above - 1));
+  return step / (kConeSteps * ior_ * ior_);
+}
+
 std::vector<Beam> diffuse_beams(const BeamDeposit& deposit,
                                 std::span<const std::array<float, 3>> q,
                                 int directions) {
   ENSURE(q.size() == deposit.faces().size());
+  const RefractedCone cone(deposit.ior());
   std::vector<Beam> beams;
   for (std::size_t f = 0; f < q.size(); ++f) {
     if (!(std::ranges::max(q[f]) > 0.0F)) continue;
@@ -83,7 +104,7 @@ std::vector<Beam> diffuse_beams(const BeamDeposit& deposit,
     std::array<double, 3> power{};
     for (int c = 0; c < 3; ++c) power[c] = q[f][c] * face.area / directions;
     for (int k = 0; k < directions; ++k) {
-      const Vec3 along = frame.to_scene(direction_behind(f, k, directions));
+      const Vec3 along = frame.to_scene(direction_behind(cone, f, k, directions));
       beams.push_back({static_cast<int>(f), along, power});
     }
   }

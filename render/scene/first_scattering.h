@@ -26,9 +26,21 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
                                  ThreadTeam& team,
                                  const std::stop_token& stop);
 
-/// Light that goes on behind each face in all directions, with the density cos theta / pi, as `directions` beams a face. They are
-/// stratified, and differ from face to face (Roberts' R2 sequence), so that few of them do: what a place gets comes from many
-/// faces. `q` one a face, W/mm^2.
+/// sin^2 inside of light that falls on a surface evenly from everywhere and passes it (Fresnel), refracted (Snell): below it lies
+/// the share of it that is asked for. With s = sin^2 theta outside, that has the density 1 - R(s), and s / eta^2 is inside.
+class RefractedCone {
+ public:
+  explicit RefractedCone(double ior);
+  double sine_squared(double share) const;
+
+ private:
+  double ior_;
+  std::vector<double> shares_;  // that come from s = k / (size - 1) and less
+};
+
+/// Light that goes on behind each face in all directions of the refracted cone, as `directions` beams of the same power a face.
+/// They are stratified, and differ from face to face (Roberts' R2 sequence), so that few of them do: what a place gets comes
+/// from many faces. `q` one a face, W/mm^2.
 std::vector<Beam> diffuse_beams(const BeamDeposit& deposit,
                                 std::span<const std::array<float, 3>> q,
                                 int directions);
