@@ -7,12 +7,20 @@
 
 namespace opaline {
 
-/// Standard deviations of the natural logarithms of one channel's coefficients, one value a cell in
-/// the block's order: 0.1 is about 10 %; 1 is a factor of e up or down.
-struct ChannelUncertainty {
+/// Of the natural logarithms of one channel's coefficients, one value a cell in the block's order.
+struct LogCoefficients {
   std::vector<double> absorption;          ///< of log sigma_a
   std::vector<double> reduced_scattering;  ///< of log sigma_s'
   std::vector<double> diffusion;           ///< of log kappa
+  bool operator==(const LogCoefficients&) const = default;
+};
+
+/// How well one channel is known: the posterior's mean lies `shift` from what is reported, and its own
+/// deviation is (deviation^2 - shift^2)^(1/2).
+struct ChannelUncertainty {
+  LogCoefficients
+      deviation;  ///< about what is reported; 0.1 is about 10 %, 1 a factor of e up or down
+  LogCoefficients shift;
   bool operator==(const ChannelUncertainty&) const = default;
 };
 

@@ -106,7 +106,7 @@ class Uncertainties {
     held_out_variance_ += found->held_out_variance;
     result_.channels[c] = report(*found, estimate);
     result_.channels[c].seconds = seconds() - begun;
-    result_.material[c] = std::move(found->deviation);
+    result_.material[c] = {std::move(found->deviation), std::move(found->shift)};
     return ok();
   }
 

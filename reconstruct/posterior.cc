@@ -80,8 +80,8 @@ struct Variances {  // per cell of the block
   std::vector<double> both;  // covariance
 };
 
-LogFields logarithms(const ChannelCoefficients& c) {
-  LogFields u;
+LogCoefficients logarithms(const ChannelCoefficients& c) {
+  LogCoefficients u;
   for (std::size_t i = 0; i < c.absorption.size(); ++i) {
     u.diffusion.push_back(-std::log(3.0 * (c.absorption[i] + c.reduced_scattering[i])));
     u.absorption.push_back(std::log(c.absorption[i]));
@@ -103,15 +103,35 @@ std::vector<double> shift_to(const Information& info,
   return u;
 }
 
-LogFields shift_to(const Information& info, const Block& block, const VectorXd& y, LogFields at) {
+// log sigma_s' = log(1 / (3 kappa) - sigma_a): d = -(by_diffusion dlog kappa + by_absorption dlog sigma_a).
+struct ScatteringSlopes {
+  ScatteringSlopes(const ChannelCoefficients& c, std::size_t i)
+      : by_diffusion((c.absorption[i] + c.reduced_scattering[i]) / c.reduced_scattering[i]),
+        by_absorption(c.absorption[i] / c.reduced_scattering[i]) {}
+  double by_diffusion;
+  double by_absorption;
+};
+
+LogCoefficients shift_to(const Information& info,
+                         const Block& block,
+                         const VectorXd& y,
+                         const ChannelCoefficients& estimate) {
+  LogCoefficients at = logarithms(estimate);
   const CosinePrior& k = info.diffusion();
   const CosinePrior& a = info.absorption();
-  return {shift_to(info, block, k, y.head(k.size()), std::move(at.diffusion)),
-          shift_to(info, block, a, y.tail(a.size()), std::move(at.absorption))};
+  LogCoefficients shift;
+  shift.diffusion = shift_to(info, block, k, y.head(k.size()), std::move(at.diffusion));
+  shift.absorption = shift_to(info, block, a, y.tail(a.size()), std::move(at.absorption));
+  for (std::size_t i = 0; i < shift.diffusion.size(); ++i) {
+    const ScatteringSlopes slopes(estimate, i);
+    shift.reduced_scattering.push_back(-slopes.by_diffusion * shift.diffusion[i] -
+                                       slopes.by_absorption * shift.absorption[i]);
+  }
+  return shift;
 }
 
 // From those about the mean to those about a point that it was shifted from.
-void add_shift(const LogFields& shift, Variances& v) {
+void add_shift(const LogCoefficients& shift, Variances& v) {
   for (std::size_t i = 0; i < v.both.size(); ++i) {
     v.diffusion[i] += shift.diffusion[i] * shift.diffusion[i];
     v.absorption[i] += shift.absorption[i] * shift.absorption[i];
@@ -154,13 +174,10 @@ Variances variances(const Information& info,
           on_block(diagonal(fk, covariance.topRightCorner(nk, na), fa))};
 }
 
-// log sigma_s' = log(1 / (3 kappa) - sigma_a): d = -(sigma_t' dlog kappa + sigma_a dlog sigma_a) /
-// sigma_s'.
-ChannelUncertainty uncertainty(const Variances& v, const ChannelCoefficients& c) {
-  ChannelUncertainty out;
+LogCoefficients roots(const Variances& v, const ChannelCoefficients& c) {
+  LogCoefficients out;
   for (std::size_t i = 0; i < v.diffusion.size(); ++i) {
-    const double by_k = (c.absorption[i] + c.reduced_scattering[i]) / c.reduced_scattering[i];
-    const double by_a = c.absorption[i] / c.reduced_scattering[i];
+    const auto [by_k, by_a] = ScatteringSlopes(c, i);
     const double scattering = by_k * by_k * v.diffusion[i] + by_a * by_a * v.absorption[i] +
                               2.0 * by_k * by_a * v.both[i];
     out.diffusion.push_back(std::sqrt(v.diffusion[i]));
@@ -202,10 +219,10 @@ Result<ChannelPosterior> posterior_and(const ChannelProblem& problem,
   out.determined_diffusion = static_cast<double>(nk) - covariance.diagonal().head(nk).sum();
   out.determined_absorption = static_cast<double>(na) - covariance.diagonal().tail(na).sum();
   const VectorXd y = d.cwiseProduct(factors.solve(d.cwiseProduct(normal.gradient)));
-  out.shift = shift_to(info, problem.block, y, logarithms(estimate));
+  out.shift = shift_to(info, problem.block, y, estimate);
   Variances about = variances(info, problem.block, covariance, out.diffusion, out.absorption);
   add_shift(out.shift, about);
-  out.deviation = uncertainty(about, estimate);
+  out.deviation = roots(about, estimate);
   out.grid = info.grid();
   out.solves = info.solves();
   if (held_out == nullptr) return out;

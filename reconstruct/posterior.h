@@ -38,18 +38,12 @@ struct PosteriorOptions {
   int threads = 0;                     ///< of the algebra; 0: one a core
 };
 
-/// Per cell.
-struct LogFields {
-  std::vector<double> diffusion;   ///< of log kappa
-  std::vector<double> absorption;  ///< of log sigma_a
-};
-
 /// How well one channel is known.
 struct ChannelPosterior {
-  ChannelUncertainty deviation;  ///< about the estimate: (variance + shift^2)^(1/2)
-  LogFields shift;               ///< the posterior's mean less the estimate
-  PriorOptions diffusion;        ///< as used
-  PriorOptions absorption;       ///< as used
+  LogCoefficients deviation;  ///< about the estimate: (variance + shift^2)^(1/2)
+  LogCoefficients shift;    ///< the posterior's mean less the estimate; of sigma_s' to first order
+  PriorOptions diffusion;   ///< as used
+  PriorOptions absorption;  ///< as used
   double determined_diffusion =
       0.0;  ///< effective number of parameters that the pictures determine
   double determined_absorption = 0.0;

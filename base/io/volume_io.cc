@@ -22,12 +22,25 @@ constexpr const char* kDiffusion = "diffusion";
 
 struct UncertaintyGrid {
   const char* name;
-  std::vector<double> ChannelUncertainty::*field;
+  LogCoefficients ChannelUncertainty::*kind;
+  std::vector<double> LogCoefficients::*field;
+
+  template <class Channel>
+  auto& of(Channel& channel) const {
+    return channel.*kind.*field;
+  }
 };
-constexpr std::array<UncertaintyGrid, 3> kUncertaintyGrids{
-    {{"absorption_log_sd", &ChannelUncertainty::absorption},
-     {"reduced_scattering_log_sd", &ChannelUncertainty::reduced_scattering},
-     {"diffusion_log_sd", &ChannelUncertainty::diffusion}}};
+constexpr std::array<UncertaintyGrid, 6> kUncertaintyGrids{
+    {{"absorption_log_sd", &ChannelUncertainty::deviation, &LogCoefficients::absorption},
+     {"reduced_scattering_log_sd",
+      &ChannelUncertainty::deviation,
+      &LogCoefficients::reduced_scattering},
+     {"diffusion_log_sd", &ChannelUncertainty::deviation, &LogCoefficients::diffusion},
+     {"absorption_log_shift", &ChannelUncertainty::shift, &LogCoefficients::absorption},
+     {"reduced_scattering_log_shift",
+      &ChannelUncertainty::shift,
+      &LogCoefficients::reduced_scattering},
+     {"diffusion_log_shift", &ChannelUncertainty::shift, &LogCoefficients::diffusion}}};
 
 using Grid = openvdb::Vec3SGrid;
 
@@ -54,7 +67,7 @@ Result<void> check_shapes(const Material& material) {
 Result<void> check_shapes(const Block& block, const MaterialUncertainty& uncertainty) {
   for (int c = 0; c < kColorChannels; ++c) {
     for (const UncertaintyGrid& grid : kUncertaintyGrids) {
-      const std::size_t size = (uncertainty[c].*grid.field).size();
+      const std::size_t size = grid.of(uncertainty[c]).size();
       if (size == block.cell_count()) continue;
       return invalid_argument(fmt::format("uncertainty: channel {}, {} has {} values for {} cells",
                                           kChannelNames[c],
@@ -110,7 +123,7 @@ openvdb::GridPtrVec make_grids(const Material& material, const MaterialUncertain
   if (uncertainty == nullptr) return grids;
   for (const UncertaintyGrid& grid : kUncertaintyGrids) {
     grids.push_back(make_grid(material.block, grid.name, "1", [&](int c, std::size_t i) {
-      return ((*uncertainty)[c].*grid.field)[i];
+      return grid.of((*uncertainty)[c])[i];
     }));
   }
   return grids;
@@ -187,33 +200,35 @@ Result<Grid::Ptr> find_grid(const openvdb::GridPtrVec& grids,
   return grid;
 }
 
-/// One quantity of all channels; `field` picks the vector it goes to.
-template <class Channel>
+/// One quantity of all channels, none below `least`; `field_of` picks the vector it goes to.
+template <class Channel, class FieldOf>
 Result<void> read_field(const Contents& contents,
                         const char* name,
                         const Block& block,
-                        std::vector<double> Channel::*field,
+                        float least,
+                        FieldOf field_of,
                         std::array<Channel, kColorChannels>& channels) {
   const auto grid = find_grid(contents.grids, name, block);
   if (!grid) return grid.error();
-  for (auto& channel : channels) (channel.*field).resize(block.cell_count());
+  for (auto& channel : channels) field_of(channel).resize(block.cell_count());
   const Grid::ConstAccessor accessor = (*grid)->getConstAccessor();
   for (int k = 0; k < block.nz; ++k) {
     for (int j = 0; j < block.ny; ++j) {
       for (int i = 0; i < block.nx; ++i) {
         const openvdb::Vec3s value = accessor.getValue(openvdb::Coord(i, j, k));
         for (int c = 0; c < kColorChannels; ++c) {
-          if (!std::isfinite(value[c]) || value[c] < 0.0f) {
+          if (!std::isfinite(value[c]) || value[c] < least) {
             return invalid_argument(
-                fmt::format("damaged: {}.{} of cell ({}, {}, {}) is {}; expected a number >= 0",
+                fmt::format("damaged: {}.{} of cell ({}, {}, {}) is {}; expected a number >= {}",
                             name,
                             kChannelNames[c],
                             i,
                             j,
                             k,
-                            value[c]));
+                            value[c],
+                            least));
           }
-          (channels[c].*field)[block.index(i, j, k)] = value[c];
+          field_of(channels[c])[block.index(i, j, k)] = value[c];
         }
       }
     }
@@ -240,21 +255,17 @@ Result<Material> to_material(const Contents& contents) {
       metadata_value<openvdb::StringMetadata, std::string>(contents.metadata, "opaline_name");
   if (!name) return name.error();
   Material material{*block, *ior, {}, *name};
-  if (auto r = read_field(
-          contents, kAbsorption, *block, &ChannelCoefficients::absorption, material.channels);
-      !r) {
+  const auto read = [&](const char* quantity, std::vector<double> ChannelCoefficients::*field) {
+    const auto of = [&](ChannelCoefficients& c) -> std::vector<double>& { return c.*field; };
+    return read_field(contents, quantity, *block, 0.0f, of, material.channels);
+  };
+  if (auto r = read(kAbsorption, &ChannelCoefficients::absorption); !r) return r.error();
+  if (auto r = read(kReducedScattering, &ChannelCoefficients::reduced_scattering); !r)
     return r.error();
-  }
-  if (auto r = read_field(contents,
-                          kReducedScattering,
-                          *block,
-                          &ChannelCoefficients::reduced_scattering,
-                          material.channels);
-      !r) {
-    return r.error();
-  }
   return material;
 }
+
+constexpr float kMostShift = 1e6f;
 
 /// All of its grids or none.
 Result<std::optional<MaterialUncertainty>> to_uncertainty(const Contents& contents) {
@@ -269,7 +280,9 @@ Result<std::optional<MaterialUncertainty>> to_uncertainty(const Contents& conten
   if (!block) return block.error();
   MaterialUncertainty channels;
   for (const UncertaintyGrid& grid : kUncertaintyGrids) {
-    auto r = read_field(contents, grid.name, *block, grid.field, channels);
+    const auto of = [&](ChannelUncertainty& c) -> std::vector<double>& { return grid.of(c); };
+    const float least = grid.kind == &ChannelUncertainty::shift ? -kMostShift : 0.0f;
+    auto r = read_field(contents, grid.name, *block, least, of, channels);
     if (!r) return r.error();
   }
   return std::optional(std::move(channels));

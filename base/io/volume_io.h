@@ -19,7 +19,9 @@ namespace opaline {
 ///              float grids would have to be combined by hand
 ///              absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd (1), likewise, where
 ///              the uncertainty was computed: standard deviations of the natural logarithms, so 0.1
-///              is about 10 % and 1 a factor of e (base/uncertainty.h); all three or none
+///              is about 10 % and 1 a factor of e (base/uncertainty.h); and absorption_log_shift,
+///              reduced_scattering_log_shift, diffusion_log_shift: from these logarithms to the
+///              posterior's mean; all six or none
 ///   transform  index (i, j, k) is the centre of cell (i, j, k): world = ((i + 0.5) hx,
 ///              (j + 0.5) hy, (k + 0.5) hz), in mm; cells need not be cubes
 ///   metadata   file: opaline_format (int32), opaline_generator, opaline_name, opaline_ior,

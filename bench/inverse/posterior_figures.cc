@@ -117,8 +117,7 @@ void print(const Dataset& dataset, const std::string& name, const std::vector<La
 }
 
 /// The estimate moved to the posterior's mean; diffusion and absorption leave room for scattering.
-ChannelCoefficients moved(const ChannelCoefficients& estimate,
-                          const reconstruct::LogFields& shift) {
+ChannelCoefficients moved(const ChannelCoefficients& estimate, const LogCoefficients& shift) {
   ChannelCoefficients at = estimate;
   for (std::size_t i = 0; i < at.absorption.size(); ++i) {
     const double total = extinction(estimate, i) * std::exp(-shift.diffusion[i]);

@@ -186,7 +186,10 @@ std::string uncertainty_section(const json& reconstruction) {
              "model's error counts, in part as noise that differs from datum to datum, in part as "
              "one that is smooth over a picture; where it is larger than model_error, the true "
              "deviations are larger. Those of each cell are in material.vdb: "
-             "absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd.") +
+             "absorption_log_sd, reduced_scattering_log_sd, diffusion_log_sd; and how far the most "
+             "probable logarithms lie beside those reported: absorption_log_shift, "
+             "reduced_scattering_log_shift, diffusion_log_shift. About those the deviation is "
+             "(sd² − shift²)^(1/2).") +
          budget_of(reconstruction);
 }
 

@@ -73,9 +73,10 @@ TEST_F(MaterialUncertaintyTest, KnowsEveryChannelBetterThanBeforeAndTheSeenFaceB
   for (std::size_t c = 0; c < kColorChannels; ++c) {
     const ChannelUncertaintyReport& report = (*result)->channels[c];
     const ChannelUncertainty& cells = (*result)->material[c];
-    EXPECT_THAT(cells.absorption, SizeIs(options_.block.cell_count()));
-    EXPECT_THAT(cells.absorption, Each(Le(report.absorption.prior)));
-    EXPECT_THAT(cells.diffusion, Each(Le(report.diffusion.prior)));
+    EXPECT_THAT(cells.deviation.absorption, SizeIs(options_.block.cell_count()));
+    EXPECT_THAT(cells.deviation.absorption, Each(Le(report.absorption.prior)));
+    EXPECT_THAT(cells.deviation.diffusion, Each(Le(report.diffusion.prior)));
+    EXPECT_THAT(cells.shift.reduced_scattering, SizeIs(options_.block.cell_count()));
     ASSERT_THAT(report.reduced_scattering.layers, SizeIs(6));
     EXPECT_LT(report.reduced_scattering.layers.front(), 0.5 * report.reduced_scattering.prior);
     EXPECT_GT(report.reduced_scattering.prior, report.reduced_scattering.amplitude);
@@ -89,7 +90,7 @@ TEST_F(MaterialUncertaintyTest, CountsLayersFromTheSeenFace) {
   const auto result = compute();
   ASSERT_TRUE(result && result->has_value());
   const std::size_t layer = 64;
-  const auto& cells = (*result)->material[1].reduced_scattering;
+  const auto& cells = (*result)->material[1].deviation.reduced_scattering;
   double sum = 0.0;
   for (std::size_t i = cells.size() - layer; i < cells.size(); ++i) sum += cells[i] * cells[i];
   EXPECT_DOUBLE_EQ((*result)->channels[1].reduced_scattering.layers.front(),

@@ -230,6 +230,12 @@ TEST(Posterior, IsThePriorWhereNothingWasMeasured) {
         found.deviation.diffusion[i],
         std::hypot(options.diffusion.level, options.diffusion.amplitude, found.shift.diffusion[i]),
         1e-9);
+    const double step = 1e-6;
+    const double moved =
+        (c.absorption[i] + c.reduced_scattering[i]) * std::exp(-step * found.shift.diffusion[i]) -
+        c.absorption[i] * std::exp(step * found.shift.absorption[i]);
+    EXPECT_NEAR(
+        found.shift.reduced_scattering[i], std::log(moved / c.reduced_scattering[i]) / step, 1e-4);
   }
   EXPECT_NEAR(found.determined_diffusion + found.determined_absorption, 0.0, 1e-9);
 }

@@ -35,9 +35,15 @@ MaterialUncertainty make_uncertainty(const Block& block) {
   for (std::size_t c = 0; c < channels.size(); ++c) {
     for (std::size_t i = 0; i < block.cell_count(); ++i) {
       const double value = static_cast<double>(i + 1) / 256.0;
-      channels[c].absorption.push_back(value + static_cast<double>(c));
-      channels[c].reduced_scattering.push_back(value + static_cast<double>(3 + c));
-      channels[c].diffusion.push_back(value + static_cast<double>(6 + c));
+      const auto shifted = [&](int by) {
+        return value + static_cast<double>(by) + static_cast<double>(c);
+      };
+      channels[c].deviation.absorption.push_back(shifted(0));
+      channels[c].deviation.reduced_scattering.push_back(shifted(3));
+      channels[c].deviation.diffusion.push_back(shifted(6));
+      channels[c].shift.absorption.push_back(shifted(-3));
+      channels[c].shift.reduced_scattering.push_back(shifted(-6));
+      channels[c].shift.diffusion.push_back(shifted(-9));
     }
   }
   return channels;
@@ -74,8 +80,9 @@ TEST(VolumeIo, KeepsTheUncertaintyBesideTheCoefficients) {
   ASSERT_TRUE(read->has_value());
   EXPECT_EQ(**read, uncertainty);
   EXPECT_EQ(read_material(path).value(), material);
-  EXPECT_THAT(output_of("vdb_print -l " + path.string() + " 2>&1"),
-              HasSubstr("Name: reduced_scattering_log_sd"));
+  EXPECT_THAT(
+      output_of("vdb_print -l " + path.string() + " 2>&1"),
+      AllOf(HasSubstr("Name: reduced_scattering_log_sd"), HasSubstr("Name: diffusion_log_shift")));
 }
 
 TEST(VolumeIo, SaysWhenThereIsNoUncertainty) {
@@ -90,7 +97,7 @@ TEST(VolumeIo, SaysWhenThereIsNoUncertainty) {
 TEST(VolumeIo, RefusesAnUncertaintyThatDoesNotFitTheBlock) {
   const Material material = make_material();
   MaterialUncertainty uncertainty = make_uncertainty(material.block);
-  uncertainty[1].diffusion.pop_back();
+  uncertainty[1].deviation.diffusion.pop_back();
   const auto encoded = encode_material(material, "test", &uncertainty);
   ASSERT_FALSE(encoded);
   EXPECT_THAT(encoded.error().message,
