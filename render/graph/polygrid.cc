@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace opaline::render {
 namespace {
@@ -14,6 +15,8 @@ constexpr std::array<Vec3, 6> kDirections{
 
 constexpr int kMostLevels = 6;
 constexpr int kOutside = -1;
+constexpr int kHalvings = 10;
+constexpr double kSameSide = 0.7;  // cosine between normals
 
 using Cell = std::array<long, 3>;
 
@@ -159,27 +162,71 @@ class Lattice {
   std::vector<Cell> firsts_;         // of each node
 };
 
-void link_surface(const SignedDistance& solid, Polygrid& grid, std::size_t node) {
-  const double h = grid.spacing;
-  const Vec3 place = grid.inner[node];
-  const Vec3 normal = solid.normal(place, 0.01 * h);
-  const double depth = std::abs(solid.at(place));
-  double area = 0.0;
-  int widest = -1;
-  double width = 0.0;
+/// What the open faces of a node see of one side of the surface.
+struct Side {
+  Vec3 hit;  // of its first face's perpendicular
+  Vec3 normal;
+  std::vector<int> faces;
+};
+
+/// Where the surface is met from `inside` towards `direction`, within `reach`.
+Vec3 hit_of(const SignedDistance& solid, Vec3 inside, Vec3 direction, double reach) {
+  double low = 0.0;
+  double high = reach;
+  for (int halvings = 0; halvings < kHalvings; ++halvings) {
+    const double middle = 0.5 * (low + high);
+    (solid.at(inside + direction * middle) < 0.0 ? low : high) = middle;
+  }
+  return inside + direction * (0.5 * (low + high));
+}
+
+std::vector<Side> sides_of(const SignedDistance& solid, const Polygrid& grid, std::size_t node) {
+  std::vector<Side> sides;
   for (int k = 0; k < 6; ++k) {
-    const double share = dot(normal, kDirections[k]);
-    if (grid.links[node][k].inner >= 0 || share <= 0.0) continue;
-    area += h * h * share;
+    if (grid.links[node][k].inner >= 0) continue;
+    const Vec3 hit = hit_of(solid, grid.inner[node], kDirections[k], grid.spacing);
+    const Vec3 normal = solid.normal(hit, 0.01 * grid.spacing);
+    const auto same = std::ranges::find_if(
+        sides, [&](const Side& side) { return dot(side.normal, normal) > kSameSide; });
+    if (same != sides.end())
+      same->faces.push_back(k);
+    else
+      sides.push_back({hit, normal, {k}});
+  }
+  return sides;
+}
+
+void link_side(const Side& side, Vec3 normal, double depth, Polygrid& grid, std::size_t node) {
+  double area = 0.0;
+  int widest = side.faces.front();
+  double width = 0.0;
+  for (const int k : side.faces) {
+    const double share = std::max(0.0, dot(normal, kDirections[k]));
+    area += grid.spacing * grid.spacing * share;
     if (share <= width) continue;
     width = share;
     widest = k;
   }
-  if (widest < 0) return;
+  if (area == 0.0) return;
   const auto surface = static_cast<int>(grid.surface.size());
   grid.links[node][widest] = {-1, surface, area, depth, depth};
   grid.surface.push_back(
-      {place + normal * depth, normal, static_cast<int>(node), area, depth, depth});
+      {grid.inner[node] + normal * depth, normal, static_cast<int>(node), area, depth, depth});
+}
+
+void link_surface(const SignedDistance& solid, Polygrid& grid, std::size_t node) {
+  const Vec3 place = grid.inner[node];
+  const std::vector<Side> sides = sides_of(solid, grid, node);
+  if (sides.size() == 1) {
+    link_side(sides.front(),
+              solid.normal(place, 0.01 * grid.spacing),
+              std::abs(solid.at(place)),
+              grid,
+              node);
+    return;
+  }
+  for (const Side& side : sides)
+    link_side(side, side.normal, std::max(0.0, dot(side.hit - place, side.normal)), grid, node);
 }
 
 }  // namespace

@@ -19,6 +19,9 @@ namespace opaline::render {
 /// of the surface itself. (Conditions along the links instead stall at 5 to 6 % of error, docs/physics.md.) So TwoPoint serves
 /// this graph as it serves a QuadGraph, and converges with h.
 ///
+/// Where the open faces of a node look at sides of the surface whose normals differ by more than 45 degrees, as at a cube's edges
+/// and in a sheet one node thick, each side has a boundary node of its own, on the plane through where the lattice's line meets it.
+///
 /// Adaptive with depth (Wang 2008, sec. 5): eight nodes become one of twice the spacing, and so on, where they lie so deep that
 /// spacing + K depth allows it, away from the surface, and where no neighbour then is less than half as large. Towards smaller
 /// neighbours a node has four links, which lean: a small error, where the light is smooth.

@@ -127,6 +127,48 @@ TEST(Polygrid, BoundaryNodesLieOnTheSurfaceAndCoverIt) {
   EXPECT_NEAR(volume / (2.0 * std::numbers::pi * std::numbers::pi * 7.5 * 2.5 * 2.5), 1.0, 0.02);
 }
 
+class Cuboid final : public SignedDistance {
+ public:
+  Cuboid(Vec3 half, double turn) : half_(half), cos_(std::cos(turn)), sin_(std::sin(turn)) {}
+  double at(Vec3 p) const override {
+    const Vec3 d{std::abs(cos_ * p.x + sin_ * p.y) - half_.x,
+                 std::abs(cos_ * p.y - sin_ * p.x) - half_.y,
+                 std::abs(p.z) - half_.z};
+    const Vec3 out{std::max(d.x, 0.0), std::max(d.y, 0.0), std::max(d.z, 0.0)};
+    return length(out) + std::min(0.0, std::max({d.x, d.y, d.z}));
+  }
+  Box bounds() const override {
+    const double reach = std::hypot(half_.x, half_.y);
+    return {{-reach, -reach, -half_.z}, {reach, reach, half_.z}};
+  }
+
+ private:
+  Vec3 half_;
+  double cos_;
+  double sin_;
+};
+
+double surface_area(const SignedDistance& solid, double spacing) {
+  const auto grid = make_polygrid(solid, spacing, 0.0, {});
+  EXPECT_TRUE(grid);
+  double area = 0.0;
+  for (const auto& node : grid->surface) {
+    EXPECT_NEAR(solid.at(node.place), 0.0, 0.3 * spacing);
+    area += node.area;
+  }
+  return area;
+}
+
+TEST(Polygrid, ACubesEdgesAndCornersBelongToEachOfTheirSides) {
+  EXPECT_NEAR(surface_area(Cuboid({4.0, 4.0, 4.0}, 0.0), 0.5), 6.0 * 64.0, 1e-6);
+  EXPECT_NEAR(surface_area(Cuboid({4.0, 4.0, 4.0}, 0.4), 0.25), 6.0 * 64.0, 0.02 * 6.0 * 64.0);
+}
+
+TEST(Polygrid, ASlantedSheetOfOneOrTwoNodesHasBothOfItsSides) {
+  const double area = 8.0 * (8.0 * 8.0 + 2.0 * 8.0 * 0.35);
+  EXPECT_NEAR(surface_area(Cuboid({8.0, 0.35, 8.0}, 0.4), 0.5), area, 0.05 * area);
+}
+
 TEST(Polygrid, LinksGoBothWays) {
   const Polygrid grid = grid_of("figurine", 1.0);
   for (std::size_t i = 0; i < grid.links.size(); ++i) {

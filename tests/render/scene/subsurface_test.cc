@@ -239,6 +239,16 @@ TEST(Subsurface, ACreaseIsLitByItsFacesAndNotByANormalBetweenThem) {
   EXPECT_LT(unevenness(EvenlyLitCube(20.0), Discretisation::kElements, false)[0], 0.0075);
 }
 
+// Before, with one normal for all open faces of a node: 0.58.
+TEST(Subsurface, EachSideOfALatticesEdgeNodesIsLitByItself) {
+  for (const double degrees : {0.0, 20.0}) {
+    const auto [fluence, flux] =
+        unevenness(EvenlyLitCube(degrees), Discretisation::kPolygrid, false);
+    EXPECT_LT(fluence, 1e-4) << degrees;
+    EXPECT_LT(flux, 1e-4) << degrees;
+  }
+}
+
 TEST(Subsurface, ASmoothShapeHasNoCreases) {
   ThreadTeam team(1);
   for (const char* shape : {"sphere", "torus", "knot"}) {
