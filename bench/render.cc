@@ -20,6 +20,7 @@
 //              those are off
 //   transport  their exitance against Monte Carlo through the tetrahedra, split into model, discretisation and noise, with diffuse light
 //              at the surface and followed; the model's by how many mean free paths thick the solid is there
+//   radiance   the same of radiance at 45, 90 and 135 degrees from a collimated light, with single scattering left to diffusion and as itself
 //   directions what few directions of diffuse light do to the radiance of each vertex, against 64 of them; processor seconds of a
 //              picture's light
 //   dials      processor seconds of one picture's light against its error, of the torus, for each method, size, K, tolerance and
@@ -42,6 +43,7 @@ int main(int argc, char** argv) try {
       {"accuracy", bench::measure_accuracy},
       {"geometry", bench::measure_geometry},
       {"transport", bench::measure_transport},
+      {"radiance", bench::measure_radiance},
       {"directions", bench::measure_directions},
       {"dials", [&] { is_drawn = bench::measure_dials(plot); }},
       {"sphere", bench::measure_sphere},

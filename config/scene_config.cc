@@ -74,6 +74,14 @@ void visit_diffusion(Fields& fields, DiffusionOptions& d) {
   fields.check(d.method != Discretisation::kPolygrid || d.entry == Entry::kDiffuse,
                "entry",
                "beams are followed through tetrahedra: method = \"polygrid\" needs \"diffuse\"");
+  fields.flag(
+      {"single_scattering",
+       "whether light of lamps that was scattered once is seen along the camera's rays, sharp, "
+       "and only the rest diffuses"},
+      d.single_scattering);
+  fields.check(!d.single_scattering || d.entry == Entry::kCollimated,
+               "single_scattering",
+               "it is of beams: it needs entry = \"collimated\"");
   fields.whole(
       {"directions",
        "in which diffuse light is followed behind each face to where it scatters first; 0: it "

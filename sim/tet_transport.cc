@@ -213,10 +213,18 @@ class Tracer {
       return true;
     }
     if (!photon.collided) sums.unscattered += photon.weight;
-    if (photon.collided || options_.count_unscattered)
+    if ((photon.collided || options_.count_unscattered) && is_seen(photon.along, out.normal))
       sums.left[patch_[out.surface]] += photon.weight;
     photon.weight = 0.0;
     return false;
+  }
+
+  /// Whether what arrives along a direction leaves within the angle of what is tallied (Snell).
+  bool is_seen(Vec3 along, Vec3 normal) const {
+    if (options_.seen_cosine <= -1.0) return true;
+    const Vec3 tangent = (along - normal * dot(along, normal)) * solid_.ior;
+    const Vec3 outside = tangent + normal * std::sqrt(std::max(0.0, 1.0 - dot(tangent, tangent)));
+    return dot(outside, normalized(options_.seen)) >= options_.seen_cosine;
   }
 
   const TetSolid& solid_;

@@ -37,6 +37,8 @@ struct TetTransportOptions {
   TetEntry entry = TetEntry::kDiffuse;
   Vec3 direction{0.0, 0.0, -1.0};  ///< outside, in which collimated light travels
   bool count_unscattered = true;   ///< whether light that leaves without a collision is tallied
+  Vec3 seen{0.0, 0.0, 1.0};        ///< only light that leaves within an angle about this is tallied
+  double seen_cosine = -1.0;       ///< the angle's cosine; -1: all light is
   bool count_first = false;        ///< whether first collisions are tallied
   std::uint64_t photons = 1'000'000;
   std::uint64_t seed = 1;

@@ -154,6 +154,21 @@ void measure_transport() {
   }
 }
 
+void measure_radiance() {
+  constexpr double kPhotons = 3.2e6;
+  ThreadTeam team(kThreads);
+  for (const std::string name : {"torus", "figurine"}) {
+    for (const double degrees : {45.0, 90.0, 135.0}) {
+      const auto which = fmt::format("{}-{}-degrees", name, degrees);
+      const RadianceError error =
+          radiance_error(name, degrees, elements_of(name, 0), kPhotons, team);
+      print_figure("render.radiance_vs_monte_carlo", which, error.diffused, "1");
+      print_figure("render.radiance_vs_monte_carlo", which + "-sharp", error.sharp, "1");
+      print_figure("render.monte_carlo_noise", which, error.noise, "1");
+    }
+  }
+}
+
 void measure_directions() {
   constexpr int kMany = 64;
   ThreadTeam team(kThreads);

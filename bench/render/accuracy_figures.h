@@ -7,6 +7,7 @@ void measure_sphere();
 void measure_accuracy();
 void measure_geometry();
 void measure_transport();
+void measure_radiance();
 void measure_directions();
 
 }  // namespace opaline::bench

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
+#include <numbers>
 #include <vector>
 
 #include "base/ensure.h"
 #include "base/log.h"
 #include "bench/render/render_case.h"
 #include "render/mesh/shapes.h"
+#include "render/scene/single_scattering.h"
 #include "render/scene/subsurface.h"
 #include "render/tetrahedra/stuffing.h"
 #include "sim/fresnel.h"
@@ -19,7 +22,8 @@ namespace opaline::bench {
 namespace {
 
 constexpr Vec3 kTowards{0.6, 0.48, 0.64};
-constexpr double kPatch = 2.5;  // mm
+const Vec3 kAside = normalized(Vec3{0.64, 0.0, -0.6});  // across that
+constexpr double kPatch = 2.5;                          // mm
 constexpr int kGreen = 1;
 
 /// Numbers patches by the cell of a grid that a place lies in.
@@ -88,12 +92,10 @@ std::vector<render::Beam> beams_into(const Case& lit, const render::BeamDeposit&
   return beams;
 }
 
-Exitance diffused(const Case& lit,
-                  const render::DiffusionOptions& options,
-                  Patches& patches,
-                  ThreadTeam& team) {
-  const auto body =
-      render::Subsurface::create(lit.solid, marbled_optics, lit.ior, options, team, {});
+std::unique_ptr<render::Subsurface> lit_body(const Case& lit,
+                                             const render::DiffusionOptions& options,
+                                             ThreadTeam& team) {
+  auto body = render::Subsurface::create(lit.solid, marbled_optics, lit.ior, options, team, {});
   ENSURE(body.has_value());
   std::vector<std::array<float, 3>> q((*body)->places().size());
   std::vector<render::Beam> beams;
@@ -105,19 +107,89 @@ Exitance diffused(const Case& lit,
     }
   }
   ENSURE((*body)->light(q, beams, {}).has_value());
-  const auto& mesh = (*body)->surface();
+  return *std::move(body);
+}
+
+Exitance diffused(const Case& lit,
+                  const render::DiffusionOptions& options,
+                  Patches& patches,
+                  ThreadTeam& team) {
+  const auto body = lit_body(lit, options, team);
+  const auto& mesh = body->surface();
   Exitance found;
-  for (const auto& [i, j, k] : mesh.triangles) {
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
+    const auto& [i, j, k] = mesh.triangles[f];
     const Vec3 a = mesh.vertices[i];
     const Vec3 b = mesh.vertices[j];
     const Vec3 c = mesh.vertices[k];
     const Vec3 normal = area_vector(a, b, c);
     const Vec3 centre = (a + b + c) * (1.0 / 3.0);
     double net = 0.0;
-    for (const int v : {i, j, k}) net += (*body)->lit().net_flux[v][kGreen] / 3.0;
+    for (const int v : {i, j, k}) net += body->lit().net_flux[v][kGreen] / 3.0;
     const double in =
         lit.collimated || options.directions != 0 ? 0.0 : lit.q(lit.solid.normal(centre, 0.01));
-    found.add(patches.at(centre), (net + in) * length(normal), length(normal));
+    const double once = body->passed_once().empty() ? 0.0 : body->passed_once()[f][kGreen];
+    found.add(patches.at(centre), (net + in) * length(normal) + once, length(normal));
+  }
+  return found;
+}
+
+/// The light that leaves within an angle about a direction.
+struct Seen {
+  static constexpr double kCosine = 0.95;
+  Vec3 towards;
+  std::vector<Vec3> directions() const {
+    constexpr int kCount = 8;
+    const render::Frame frame = render::frame_around(towards);
+    std::vector<Vec3> found;
+    for (int k = 0; k < kCount; ++k) {
+      const double cosine = 1.0 - (1.0 - kCosine) * (k + 0.5) / kCount;
+      const double sine = std::sqrt(1.0 - cosine * cosine);
+      found.push_back(frame.to_scene({sine * std::cos(2.4 * k), sine * std::sin(2.4 * k), cosine}));
+    }
+    return found;
+  }
+  double solid_angle() const { return 2.0 * std::numbers::pi * (1.0 - kCosine); }
+};
+
+Exitance rendered(const Case& lit,
+                  const Seen& seen,
+                  const render::DiffusionOptions& options,
+                  Patches& patches,
+                  ThreadTeam& team) {
+  const auto body = lit_body(lit, options, team);
+  const render::TriangleMesh& mesh = body->surface();
+  const render::DrawnSurface drawn(mesh, lit.solid, 0);
+  render::Surfaces surfaces;
+  surfaces.add(mesh, drawn.normals());
+  ENSURE(surfaces.build().has_value());
+  const std::vector<render::LightOptions> lamps{
+      {.direction = kTowards * -1.0, .irradiance = {1.0, 1.0, 1.0}, .shadows = false}};
+  const render::SingleScattering once(*body->beams(), mesh, drawn, surfaces, lamps, lit.ior);
+  const std::vector<Vec3> directions = seen.directions();
+  Exitance found;
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
+    const auto& face = body->beams()->faces()[f];
+    double radiance = 0.0;  // times the cosine
+    for (const Vec3& view : directions) {
+      const double cosine = dot(face.middle.normal, view);
+      if (!(cosine > 0.0)) continue;
+      const double inside = std::sqrt(1.0 - (1.0 - cosine * cosine) / (lit.ior * lit.ior));
+      double phi = 0.0;
+      for (const int v : mesh.triangles[f]) {
+        phi +=
+            (body->lit().fluence[v][kGreen] + 3.0 * inside * body->lit().net_flux[v][kGreen]) / 3;
+      }
+      if (options.single_scattering) {
+        phi += once.seen(
+            f, face.middle.place, render::refracted(view, face.middle.normal, lit.ior))[kGreen];
+      }
+      radiance += cosine * phi * (1.0 - sim::reflectance(std::min(1.0, cosine), 1.0, lit.ior)) /
+                  (4.0 * std::numbers::pi * lit.ior * lit.ior);
+    }
+    found.add(patches.at(face.middle.place),
+              radiance / static_cast<double>(directions.size()) * seen.solid_angle() * face.area,
+              face.area);
   }
   return found;
 }
@@ -129,7 +201,7 @@ struct Traced {
       thickness;  // of the solid below each patch, mean free paths, times the patch's area
 };
 
-Traced traced(const Case& lit, double spacing, double photons, Patches& patches) {
+Traced traced(const Case& lit, const Seen* seen, double spacing, double photons, Patches& patches) {
   const auto stuffed =
       render::stuff(lit.solid, {.spacing_mm = spacing, .interior_growth = 0.1}, {});
   ENSURE(stuffed.has_value());
@@ -164,6 +236,8 @@ Traced traced(const Case& lit, double spacing, double photons, Patches& patches)
       {.entry = lit.collimated ? sim::TetEntry::kCollimated : sim::TetEntry::kDiffuse,
        .direction = kTowards * -1.0,
        .count_unscattered = !lit.collimated,
+       .seen = seen != nullptr ? seen->towards : Vec3{0.0, 0.0, 1.0},
+       .seen_cosine = seen != nullptr ? Seen::kCosine : -1.0,
        .photons = static_cast<std::uint64_t>(photons),
        .threads = 2},
       {});
@@ -237,7 +311,7 @@ TransportError transport_error(std::string_view name,
   finer.spacing_mm = 0.5 * options.spacing_mm;
   const Exitance asked = diffused(lit, options, patches, team);
   const Exitance fine = diffused(lit, finer, patches, team);
-  const Traced light = traced(lit, options.spacing_mm, photons, patches);
+  const Traced light = traced(lit, nullptr, options.spacing_mm, photons, patches);
   TransportError error;
   const Chosen all = [](std::size_t) { return true; };
   error.noise = noise_of(light, all);
@@ -257,6 +331,29 @@ TransportError transport_error(std::string_view name,
     least = band.below;
   }
   error.patches = patches.count();
+  return error;
+}
+
+RadianceError radiance_error(std::string_view name,
+                             double degrees,
+                             const render::DiffusionOptions& options,
+                             double photons,
+                             ThreadTeam& team) {
+  const auto solid = shape(name);
+  const Case lit{*solid, true, 1.3};
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Seen seen{kTowards * std::cos(angle) + kAside * std::sin(angle)};
+  Patches patches;
+  render::DiffusionOptions sharp = options;
+  sharp.single_scattering = true;
+  const Exitance without = rendered(lit, seen, options, patches, team);
+  const Exitance with = rendered(lit, seen, sharp, patches, team);
+  const Traced light = traced(lit, &seen, options.spacing_mm, photons, patches);
+  const Chosen all = [](std::size_t) { return true; };
+  RadianceError error;
+  error.noise = noise_of(light, all);
+  error.diffused = difference(without, light.exitance, error.noise, all).rms;
+  error.sharp = difference(with, light.exitance, error.noise, all).rms;
   return error;
 }
 

@@ -36,4 +36,17 @@ TransportError transport_error(std::string_view shape,
                                double photons,
                                ThreadTeam& team);
 
+/// How far the radiance of a marbled solid in collimated light at eta = 1.3, lit from one side, is from Monte Carlo in the same patches: light
+/// that leaves within 18 degrees of `seen`, the angle between which and the light is given. Relative RMS weighted by area.
+struct RadianceError {
+  double diffused = 0.0;  ///< with single scattering left to diffusion
+  double sharp = 0.0;     ///< with single scattering as itself
+  double noise = 0.0;     ///< of the Monte Carlo, taken out of both
+};
+RadianceError radiance_error(std::string_view shape,
+                             double degrees,
+                             const render::DiffusionOptions& options,
+                             double photons,
+                             ThreadTeam& team);
+
 }  // namespace opaline::bench

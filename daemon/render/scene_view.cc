@@ -26,6 +26,7 @@ Result<std::unique_ptr<SceneView>> SceneView::create(const render::Scene& scene,
   auto raster = render::RasterRenderer::create(options);
   if (raster) {
     view->raster_ = *std::move(raster);
+    view->renderer_->leave_out_single_scattering();
   } else if (draw == DrawBy::kVulkan || raster.error().code != ErrorCode::kUnavailable) {
     return raster.error();
   }

@@ -22,25 +22,28 @@ BeamDeposit::BeamDeposit(TetMesh mesh, std::vector<Optics> optics, double ior)
       optics_(std::move(optics)),
       ior_(ior),
       neighbours_(neighbours_of(mesh_)) {
-  place_faces();
+  place_corners();
 }
 
 void BeamDeposit::update(const std::vector<Vec3>& vertices, const std::vector<Optics>& optics) {
   mesh_.vertices = vertices;
   optics_ = optics;
-  place_faces();
+  place_corners();
 }
 
-void BeamDeposit::place_faces() {
+void BeamDeposit::place_corners() {
   faces_.clear();
+  corners_.resize(mesh_.tets.size());
   for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
+    const double volume = 6.0 * volume_of(mesh_, t);
     for (int k = 0; k < 4; ++k) {
-      if (neighbours_[t][k] >= 0) continue;
       const auto face = face_of(mesh_.tets[t], k);
       const Vec3 a = mesh_.vertices[face[0]];
       const Vec3 b = mesh_.vertices[face[1]];
       const Vec3 c = mesh_.vertices[face[2]];
       const Vec3 n = cross(b - a, c - a);
+      corners_[t][k] = {n * (-1.0 / volume), dot(a, n) / volume};
+      if (neighbours_[t][k] >= 0) continue;
       neighbours_[t][k] = -1 - static_cast<int>(faces_.size());
       faces_.push_back({{(a + b + c) * (1.0 / 3.0), normalized(n), std::sqrt(length(n))},
                         static_cast<int>(t),
@@ -49,53 +52,78 @@ void BeamDeposit::place_faces() {
   }
 }
 
-BeamDeposit::Deposit BeamDeposit::step(Walk& walk) const {
-  const auto& tet = mesh_.tets[walk.tet];
-  std::array<double, 4> here{};  // barycentric coordinates, and how they change along the beam
-  std::array<double, 4> slope{};
-  double length_left = std::numeric_limits<double>::infinity();
-  int out = -1;
-  const double volume = 6.0 * volume_of(mesh_, static_cast<std::size_t>(walk.tet));
+BeamDeposit::Crossing BeamDeposit::cross_tet(const Walk& walk) const {
+  Crossing crossing;
+  crossing.length = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 4; ++k) {
-    const auto face = face_of(tet, k);
-    const Vec3 a = mesh_.vertices[face[0]];
-    const Vec3 n = cross(mesh_.vertices[face[1]] - a, mesh_.vertices[face[2]] - a);
-    here[k] = dot(a - walk.place, n) / volume;
-    slope[k] = -dot(walk.along, n) / volume;
-    if (slope[k] >= 0.0 || k == walk.came_through) continue;
-    const double to = std::max(0.0, -here[k] / slope[k]);
-    if (to >= length_left) continue;
-    length_left = to;
-    out = k;
+    const auto& [gradient, offset] = corners_[walk.tet][k];
+    crossing.here[k] = dot(gradient, walk.place) + offset;
+    crossing.slope[k] = dot(gradient, walk.along);
+    if (crossing.slope[k] >= 0.0 || k == walk.came_through) continue;
+    const double to = std::max(0.0, -crossing.here[k] / crossing.slope[k]);
+    if (to >= crossing.length) continue;
+    crossing.length = to;
+    crossing.out = k;
   }
+  if (crossing.out < 0) crossing.length = 0.0;
+  return crossing;
+}
+
+BeamDeposit::Deposit BeamDeposit::step(Walk& walk) const {
+  Crossing crossing = cross_tet(walk);
+  const double longest = walk.deepest_step * 3.0 * std::ranges::min(optics_[walk.tet].diffusion);
+  crossing.stays = crossing.length > longest;
+  if (crossing.stays) crossing.length = longest;
   Deposit deposit{walk.tet, {}, {}};
-  if (out < 0) length_left = 0.0;
   double most_left = 0.0;
   for (int c = 0; c < 3; ++c) {
     const Optics& optics = optics_[walk.tet];
-    const double t = length_left / (3.0 * optics.diffusion[c]);
+    const double t = crossing.length / (3.0 * optics.diffusion[c]);
     const double scattered = walk.left[c] * -std::expm1(-t);
     const double albedo = 1.0 - 3.0 * optics.diffusion[c] * optics.absorption[c];
     deposit.power[c] = walk.power[c] * albedo * scattered;
-    const double at = t > 0.0 ? length_left * centroid(t) : 0.0;
-    for (int k = 0; k < 4; ++k)
-      deposit.corners[c][k] = std::clamp(here[k] + at * slope[k], 0.0, 1.0);
+    const double at = t > 0.0 ? crossing.length * centroid(t) : 0.0;
+    for (int k = 0; k < 4; ++k) {
+      deposit.corners[c][k] = std::clamp(crossing.here[k] + at * crossing.slope[k], 0.0, 1.0);
+    }
     walk.left[c] -= scattered;
     if (walk.power[c] > 0.0) most_left = std::max(most_left, walk.left[c]);
   }
-  walk.place = walk.place + walk.along * length_left;
+  go_on(walk, crossing, most_left <= kSpent);
+  return deposit;
+}
+
+void BeamDeposit::go_on(Walk& walk, const Crossing& crossing, bool is_spent) const {
+  walk.place = walk.place + walk.along * crossing.length;
   walk.reached = -1;
-  if (out < 0 || most_left <= kSpent || ++walk.steps >= kMostSteps) {
+  if (crossing.out < 0 || is_spent || ++walk.steps >= kMostSteps) {
     walk.tet = -1;
-  } else if (const int beyond = neighbours_[walk.tet][out]; beyond >= 0) {
+  } else if (crossing.stays) {
+    return;
+  } else if (const int beyond = neighbours_[walk.tet][crossing.out]; beyond >= 0) {
     const auto& back = neighbours_[beyond];
     walk.came_through = static_cast<int>(std::ranges::find(back, walk.tet) - back.begin());
     walk.tet = beyond;
   } else {
     walk.reached = -1 - beyond;
-    walk.came_through = out;
+    walk.came_through = crossing.out;
   }
-  return deposit;
+}
+
+BeamDeposit::WayOut BeamDeposit::way_out(int tet, Vec3 place, Vec3 along) const {
+  static const double most = -std::log(kSpent);
+  Walk walk{.along = along, .place = place, .tet = tet};
+  std::array<double, 3> depth{};
+  while (walk.tet >= 0 && walk.reached < 0) {
+    const Crossing crossing = cross_tet(walk);
+    for (int c = 0; c < 3; ++c) {
+      depth[c] += crossing.length / (3.0 * optics_[walk.tet].diffusion[c]);
+    }
+    go_on(walk, crossing, std::ranges::min(depth) >= most);
+  }
+  WayOut out{walk.reached, walk.place, {}};
+  for (int c = 0; c < 3; ++c) out.left[c] = std::exp(-depth[c]);
+  return out;
 }
 
 std::array<double, 3> BeamDeposit::mirror(Walk& walk) const {

@@ -25,25 +25,40 @@ void add(Power& sums, const Power& more) {
 
 double fraction(double x) { return x - std::floor(x); }
 
-/// Direction k of `count` behind a face, about +z, in the k-th of as many equal shares of the cone.
-/// Where in the share, and the angle about z, differ from face to face as the two coordinates of the R2 sequence do.
-Vec3 direction_behind(const RefractedCone& cone, std::size_t face, int k, int count) {
+/// Number k of `count` of place i: a share in the k-th of as many equal strata, and an angle. Where in the stratum, and the angle, differ
+/// from place to place as the two coordinates of the R2 sequence do.
+struct Spread {
+  double share = 0.0;
+  double angle = 0.0;
+};
+Spread spread(std::size_t i, int k, int count) {
   constexpr double kPlastic = 1.32471795724474602596;  // x^3 = x + 1
-  const auto f = static_cast<double>(face);
-  const double square = cone.sine_squared((k + fraction(0.5 + f / kPlastic)) / count);
-  const double angle =
-      2.0 * std::numbers::pi * (k / std::numbers::phi + fraction(0.5 + f / (kPlastic * kPlastic)));
-  const double sine = std::sqrt(square);
-  return {sine * std::cos(angle), sine * std::sin(angle), std::sqrt(1.0 - square)};
+  const auto f = static_cast<double>(i);
+  return {
+      (k + fraction(0.5 + f / kPlastic)) / count,
+      2.0 * std::numbers::pi * (k / std::numbers::phi + fraction(0.5 + f / (kPlastic * kPlastic)))};
 }
 
-}  // namespace
+Vec3 around_z(double cosine, double angle) {
+  const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
+  return {sine * std::cos(angle), sine * std::sin(angle), cosine};
+}
 
-FirstScattering first_scattering(const BeamDeposit& deposit,
-                                 std::span<const Beam> beams,
-                                 DepositAt where,
-                                 ThreadTeam& team,
-                                 const std::stop_token& stop) {
+/// The places whose mean integrates what is quadratic in a tetrahedron.
+Vec3 gauss_place(const TetMesh& mesh, std::size_t tet, int corner) {
+  constexpr double kTowards = 0.4472135955;  // 1 / sqrt(5)
+  const Vec3 middle = centroid_of(mesh, tet);
+  return middle + (mesh.vertices[mesh.tets[tet][corner]] - middle) * kTowards;
+}
+
+/// Follows beam_of(0) to beam_of(count - 1), a share of them in each thread of the team.
+template <class BeamOf>
+FirstScattering followed(const BeamDeposit& deposit,
+                         std::size_t count,
+                         const BeamOf& beam_of,
+                         DepositAt where,
+                         ThreadTeam& team,
+                         const std::stop_token& stop) {
   const TetMesh& mesh = deposit.mesh();
   const bool at_vertices = where == DepositAt::kVertices;
   const std::size_t nodes = at_vertices ? mesh.vertices.size() : mesh.tets.size();
@@ -51,10 +66,11 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
   team.run([&](int thread) {
     FirstScattering& part = parts[static_cast<std::size_t>(thread)];
     part = {Power(nodes), Power(deposit.faces().size())};
-    const std::size_t first = beams.size() * thread / team.size();
-    const std::size_t last = beams.size() * (thread + 1) / team.size();
-    for (const Beam& beam : beams.subspan(first, last - first)) {
+    const std::size_t last = count * (thread + 1) / team.size();
+    for (std::size_t i = count * thread / team.size(); i < last; ++i) {
       if (stop.stop_requested()) return;
+      const InnerBeam beam = beam_of(i);
+      if (!(std::ranges::max(beam.power) > 0.0)) continue;
       deposit.follow(
           beam,
           [&](const BeamDeposit::Deposit& d) {
@@ -72,6 +88,41 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
     add(parts[0].passed, parts[p].passed);
   }
   return std::move(parts[0]);
+}
+
+}  // namespace
+
+FirstScattering first_scattering(const BeamDeposit& deposit,
+                                 std::span<const Beam> beams,
+                                 DepositAt where,
+                                 ThreadTeam& team,
+                                 const std::stop_token& stop) {
+  return followed(
+      deposit,
+      beams.size(),
+      [&](std::size_t i) { return deposit.behind(beams[i]); },
+      where,
+      team,
+      stop);
+}
+
+FirstScattering next_scattering(const BeamDeposit& deposit,
+                                std::span<const std::array<double, 3>> scattered,
+                                int directions,
+                                DepositAt where,
+                                ThreadTeam& team,
+                                const std::stop_token& stop) {
+  const auto beam_of = [&](std::size_t i) {
+    const std::size_t tet = i / directions;
+    const auto [share, angle] = spread(tet, static_cast<int>(i % directions), directions);
+    InnerBeam beam{.tet = static_cast<int>(tet),
+                   .place = gauss_place(deposit.mesh(), tet, static_cast<int>((i + tet) % 4)),
+                   .along = around_z(1.0 - 2.0 * share, angle),
+                   .power = scattered[tet]};
+    for (double& watts : beam.power) watts /= directions;
+    return beam;
+  };
+  return followed(deposit, scattered.size() * directions, beam_of, where, team, stop);
 }
 
 RefractedCone::RefractedCone(double ior) : ior_(ior), shares_(kConeSteps + 1, 0.0) {
@@ -104,7 +155,8 @@ std::vector<Beam> diffuse_beams(const BeamDeposit& deposit,
     std::array<double, 3> power{};
     for (int c = 0; c < 3; ++c) power[c] = q[f][c] * face.area / directions;
     for (int k = 0; k < directions; ++k) {
-      const Vec3 along = frame.to_scene(direction_behind(cone, f, k, directions));
+      const auto [share, angle] = spread(f, k, directions);
+      const Vec3 along = frame.to_scene(around_z(std::sqrt(1.0 - cone.sine_squared(share)), angle));
       beams.push_back({static_cast<int>(f), along, power});
     }
   }

@@ -26,6 +26,15 @@ FirstScattering first_scattering(const BeamDeposit& deposit,
                                  ThreadTeam& team,
                                  const std::stop_token& stop);
 
+/// The same of light that was scattered in tetrahedra, W each: isotropic, from four places in each as `directions` beams, which are stratified
+/// and differ from one to the next.
+FirstScattering next_scattering(const BeamDeposit& deposit,
+                                std::span<const std::array<double, 3>> scattered,
+                                int directions,
+                                DepositAt where,
+                                ThreadTeam& team,
+                                const std::stop_token& stop);
+
 /// sin^2 inside of light that falls on a surface evenly from everywhere and passes it (Fresnel), refracted (Snell): below it lies
 /// the share of it that is asked for. With s = sin^2 theta outside, that has the density 1 - R(s), and s / eta^2 is inside.
 class RefractedCone {

@@ -59,6 +59,12 @@ std::vector<LightOptions> parts_of(const LightOptions& light) {
   return parts;
 }
 
+Vec3 refracted(Vec3 towards, Vec3 normal, double ior) {
+  const double cosine = dot(normal, towards);
+  const Vec3 tangent = (normal * cosine - towards) * (1.0 / ior);
+  return normalized(tangent - normal * std::sqrt(std::max(0.0, 1.0 - dot(tangent, tangent))));
+}
+
 std::vector<Vec3> cosine_directions(int count) {
   std::vector<Vec3> directions;
   directions.reserve(count);

@@ -23,6 +23,9 @@ std::vector<LightOptions> parts_of(const LightOptions& light);
 
 bool is_black(const Colour& colour);
 
+/// The direction in which light from `towards` goes on behind a surface (Snell).
+Vec3 refracted(Vec3 towards, Vec3 normal, double ior);
+
 /// Directions over the half space around +z, as many as `count`, spread evenly (the golden angle about the axis) with the
 /// density cos theta / pi: the mean of f over them is int f cos theta dw / pi.
 std::vector<Vec3> cosine_directions(int count);

@@ -63,18 +63,22 @@ void for_rows(int rows, ThreadTeam& team, const std::stop_token& stop, const Wor
 
 }  // namespace
 
-Colour Painter::emerging(const Look& look, const Surfaces::Hit& hit, double cosine) const {
+Colour Painter::emerging(const Look& look, const Surfaces::Hit& hit, Vec3 view) const {
+  const double cosine = dot(hit.normal, view);
   const double scale = (1.0 - fresnel_reflectance(cosine, look.ior)) /
                        (4.0 * std::numbers::pi * look.ior * look.ior);
   const double inside = refracted_cosine(cosine, look.ior);
   Colour radiance{};
+  if (look.once != nullptr) {
+    radiance = look.once->seen(hit.triangle, hit.place, refracted(view, hit.normal, look.ior));
+  }
   for (int c = 0; c < 3; ++c) {
     double sum = 0.0;
     for (int k = 0; k < 3; ++k) {
       const int v = hit.vertices[k];
       sum += hit.weights[k] * (look.light.fluence[v][c] + 3.0 * inside * look.light.net_flux[v][c]);
     }
-    radiance[c] = scale * std::max(0.0, sum);
+    radiance[c] = scale * (radiance[c] + std::max(0.0, sum));
   }
   return radiance;
 }
@@ -130,7 +134,7 @@ Painter::Seen Painter::look(const Ray& ray) const {
   const Colour matte = matte_of(look, *hit);
   if (!is_black(matte)) seen.radiance = scattered(look, *hit, matte);
   if (look.translucent) {
-    const Colour inner = emerging(look, *hit, dot(hit->normal, view));
+    const Colour inner = emerging(look, *hit, view);
     for (int c = 0; c < 3; ++c) seen.radiance[c] += inner[c];
   }
   add_mirrored(look, *hit, matte, view, seen.radiance);

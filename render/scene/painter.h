@@ -8,6 +8,7 @@
 #include "base/thread_team.h"
 #include "render/graph/optics.h"
 #include "render/scene/scene.h"
+#include "render/scene/single_scattering.h"
 #include "render/scene/surfaces.h"
 
 namespace opaline::render {
@@ -20,7 +21,8 @@ struct Look {
   Colour reflectance{};  ///< of an opaque one
   std::vector<Colour>
       finish{};  ///< of the vertices of a translucent one whose surface was measured: pi rho_s
-  SurfaceLight light{};  ///< of a translucent one's vertices
+  const SingleScattering* once = nullptr;  ///< of a translucent one where that is seen as itself
+  SurfaceLight light{};                    ///< of a translucent one's vertices
   std::vector<float>
       marks{};  ///< of its vertices; above 1/2: shown in magenta, as wrong. Empty: none
   double mark_radiance = 0.0;  ///< of the magenta, W/(mm^2 sr)
@@ -30,7 +32,8 @@ struct Look {
 
 /// Pictures of lit surfaces, by rays. A point shows, towards the camera,
 ///
-///   translucent   F_t(mu_o) / (4 pi ior^2) (phi + 3 mu_i J_n)         (docs/physics.md, "Radiance towards a camera")
+///   translucent   F_t(mu_o) / (4 pi ior^2) (phi + 3 mu_i J_n + Phi_1)          (docs/physics.md, "Radiance towards a camera";
+///                 Phi_1, where the scene asks for it: single_scattering.h)
 ///   opaque        rho / pi (sum of lights E (n.l) + pi L_env share)                                      (Lambert)
 ///   measured      the same with rho = pi rho_s, on top of the translucent one's own               (measured_finish.h)
 ///   both          + sum of lights f_s E (n.l)  + R(mu_o) L_env where the mirrored ray meets nothing       (specular.h)
@@ -66,7 +69,7 @@ class Painter {
   Seen look(const Ray& ray) const;
 
  private:
-  Colour emerging(const Look& look, const Surfaces::Hit& hit, double cosine) const;
+  Colour emerging(const Look& look, const Surfaces::Hit& hit, Vec3 view) const;
   Colour scattered(const Look& look, const Surfaces::Hit& hit, const Colour& matte) const;
   void add_mirrored(const Look& look,
                     const Surfaces::Hit& hit,

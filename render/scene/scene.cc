@@ -156,6 +156,11 @@ Result<void> check_diffusion(const DiffusionOptions& diffusion) {
   if (!(diffusion.interior_growth >= 0.0 && diffusion.interior_growth <= 10.0)) {
     return invalid_argument("interior_growth: expected 0 to 10");
   }
+  if (diffusion.single_scattering &&
+      (diffusion.entry != Entry::kCollimated || diffusion.method == Discretisation::kPolygrid)) {
+    return invalid_argument(
+        "single_scattering: it is of beams: expected collimated entry, and no polygrid");
+  }
   return ok();
 }
 

@@ -146,6 +146,8 @@ struct DiffusionOptions {
   int directions =
       kAutomatic;  ///< in which diffuse light is followed behind each face to where it scatters first; 0: it enters at the
                    ///< surface; automatic: 4, and not for what moves (Subsurface::light())
+  bool single_scattering =
+      false;  ///< whether what beams scatter first is seen as itself (single_scattering.h), not by diffusion
   double tetrahedra = 1e5;       ///< about so many an object, if they were all of one size; or
   double spacing_mm = 0.0;       ///< this edge of the lattice; 0: from `tetrahedra`
   double interior_growth = 0.1;  ///< the papers' K

@@ -32,13 +32,6 @@ double brightest(const Look& look) {
   return most / (4.0 * std::numbers::pi * look.ior * look.ior);
 }
 
-/// The ray that goes on inside of light from `towards` (Snell).
-Vec3 refracted(Vec3 towards, Vec3 normal, double ior) {
-  const double cosine = dot(normal, towards);
-  const Vec3 tangent = (normal * cosine - towards) * (1.0 / ior);
-  return normalized(tangent - normal * std::sqrt(std::max(0.0, 1.0 - dot(tangent, tangent))));
-}
-
 }  // namespace
 
 Result<void> SceneRenderer::look_at_sky(std::stop_token stop) {

@@ -88,7 +88,14 @@ Result<void> SceneRenderer::add_translucent(const ObjectOptions& object,
   looks_.push_back({.translucent = true, .ior = (*body)->ior(), .surface = object.surface});
   looks_.back().marks = (*body)->marks();
   looks_.back().finish = (*body)->finish();
-  bodies_.push_back({*std::move(body), number});
+  std::unique_ptr<SingleScattering> once;
+  if (scene_.diffusion.single_scattering) {
+    const Subsurface& solid = (*body)->subsurface();
+    once = std::make_unique<SingleScattering>(
+        *solid.beams(), solid.surface(), drawn, surfaces_, sources_, (*body)->ior());
+    looks_.back().once = once.get();
+  }
+  bodies_.push_back({*std::move(body), std::move(once), number});
   opaque_.emplace_back();
   return ok();
 }
@@ -119,6 +126,14 @@ Result<void> SceneRenderer::add_opaque(const ObjectOptions& object,
                     .reflectance = object.reflectance});
   opaque_.push_back(std::move(opaque));
   return ok();
+}
+
+void SceneRenderer::leave_out_single_scattering() {
+  if (!scene_.diffusion.single_scattering) return;
+  leave_out("single scattering: the rasteriser does not follow rays into objects");
+  scene_.diffusion.single_scattering = false;
+  for (Body& body : bodies_) body.body->subsurface().leave_out_single_scattering();
+  for (Look& look : looks_) look.once = nullptr;
 }
 
 std::vector<SceneRenderer::DrawnObject> SceneRenderer::drawn() const {

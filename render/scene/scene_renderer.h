@@ -47,8 +47,7 @@ struct SceneStatistics {
 ///   of each light        q = (1 - R(n.l)) E (n.l), as a beam from the middle of each face along the refracted ray
 ///                        (beam_deposit.h), or diffuse as well (Entry)
 ///
-/// Left out: light between objects beyond shadows; single scattering; light through a translucent object that never
-/// scattered.
+/// Left out: light between objects beyond shadows; light through a translucent object that never scattered.
 /// Threads: one call at a time; the team does the work.
 /// Errors:  kInvalidArgument, naming object or light, for what validate() and the files refuse; kNotFound; kCancelled;
 ///          kInternal where a solution is not found.
@@ -93,6 +92,8 @@ class SceneRenderer {
   std::uint64_t shape() const { return shape_; }
   const std::vector<LightOptions>& lights() const { return lights_; }
   const EnvironmentOptions& environment() const { return scene_.environment; }
+  /// For somebody else who draws the scene: what was scattered once is left to diffusion, which the statistics say. Call before light().
+  void leave_out_single_scattering();
   /// For somebody else who draws the scene: what that leaves out, and how long it took.
   void leave_out(std::string what);
   void took(double draw_seconds) { statistics_.draw_seconds = draw_seconds; }
@@ -102,6 +103,7 @@ class SceneRenderer {
  private:
   struct Body {
     std::unique_ptr<TranslucentBody> body;
+    std::unique_ptr<SingleScattering> once;
     int object = 0;
   };
   struct Opaque {

@@ -20,6 +20,7 @@ using reconstruct::diffusion::SolveSummary;
 using reconstruct::diffusion::Termination;
 
 constexpr int kEnoughDirections = 4;   // of automatic ones, docs/rendering.md
+constexpr int kOnceDirections = 8;     // from each tetrahedron, of light scattered once
 constexpr double kFarOff = 10.0;       // tolerances; a residual above that is no solution
 constexpr double kNormalStep = 0.02;   // of a place's size, for gradients of the distance
 constexpr double kBendingStep = 1e-3;  // of a place's size, for those of a deformation
@@ -301,8 +302,18 @@ Result<SolveSummary> Subsurface::light(const DiffuseLight& diffuse,
                                        std::span<const Beam> beams,
                                        std::stop_token stop) {
   Power scattered;
+  passed_once_.clear();
   if (!beams.empty()) {
-    scattered = first_scattering(*beams_, beams, deposit_at(), *team_, stop).scattered;
+    if (options_.single_scattering) {
+      const auto once =
+          first_scattering(*beams_, beams, DepositAt::kTetrahedra, *team_, stop).scattered;
+      FirstScattering next =
+          next_scattering(*beams_, once, kOnceDirections, deposit_at(), *team_, stop);
+      scattered = std::move(next.scattered);
+      passed_once_ = std::move(next.passed);
+    } else {
+      scattered = first_scattering(*beams_, beams, deposit_at(), *team_, stop).scattered;
+    }
   }
   environment_.entry = enter(environment_, diffuse.environment, true, diffuse.pace, stop);
   lamps_.entry = enter(lamps_, diffuse.lamps, false, diffuse.pace, stop);

@@ -105,6 +105,8 @@ class Subsurface {
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
   /// What beams enter through; none on a polygrid, which has no tetrahedra to follow them in.
   const BeamDeposit* beams() const { return beams_.get(); }
+  /// Leaves what beams scatter first to diffusion from now on (DiffusionOptions::single_scattering).
+  void leave_out_single_scattering() { options_.single_scattering = false; }
   /// Solves for diffuse light and for beams. Where the options have directions, diffuse light is followed along them to where
   /// it scatters first (docs/physics.md), once while light, material and shape stay; what of it leaves unscattered is in lit(),
   /// as if it left diffusely; of beams it is not. With automatic directions nothing is followed anew while things move: the
@@ -126,6 +128,9 @@ class Subsurface {
   bool is_provisional() const { return is_provisional_; }
   /// Of the last solution, one value a vertex of surface().
   const SurfaceLight& lit() const { return lit_; }
+  /// What of its beams leaves through each face of surface() after one scattering, W, where the options keep that apart: it
+  /// is not in lit(). Else empty.
+  const std::vector<std::array<double, 3>>& passed_once() const { return passed_once_; }
 
  protected:
   using Values = std::vector<std::array<float, 3>>;
@@ -203,6 +208,7 @@ class Subsurface {
   Creases creases_;
   std::vector<bool> inverted_corners_;
   SurfaceLight lit_;
+  std::vector<std::array<double, 3>> passed_once_;
   std::unique_ptr<BeamDeposit> beams_;
   double two_a_ = 2.0;  // of the boundary condition
   Followed environment_;

@@ -6,9 +6,8 @@
 namespace opaline::render {
 namespace {
 
-constexpr double kLift = 1e-3;     // of a place's size, above the surface
-constexpr double kSkip = 0.25;     // of a place's size, along the ray
-constexpr double kCrease = 0.707;  // cosine between facet and vertex normal: 45 degrees
+constexpr double kLift = 1e-3;  // of a place's size, above the surface
+constexpr double kSkip = 0.25;  // of a place's size, along the ray
 
 }  // namespace
 
@@ -16,6 +15,7 @@ int Surfaces::add(const TriangleMesh& mesh, const std::vector<Vec3>& normals) {
   const auto object = static_cast<int>(first_vertices_.size());
   const auto first = static_cast<int>(mesh_.vertices.size());
   first_vertices_.push_back(first);
+  first_triangles_.push_back(mesh_.triangles.size());
   mesh_.vertices.insert(mesh_.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
   normals_.insert(normals_.end(), normals.begin(), normals.end());
   for (const auto& [a, b, c] : mesh.triangles)
@@ -55,8 +55,8 @@ std::optional<Surfaces::Hit> Surfaces::nearest(const Ray& ray) const {
   const auto found = tree_->nearest(ray);
   if (!found) return std::nullopt;
   const auto& corners = mesh_.triangles[found->triangle];
-  Hit hit{
-      .object = objects_[found->triangle], .triangle = found->triangle, .weights = found->weights};
+  Hit hit{.object = objects_[found->triangle], .weights = found->weights};
+  hit.triangle = found->triangle - first_triangles_[hit.object];
   const Vec3 a = mesh_.vertices[corners[0]];
   const Vec3 area = cross(mesh_.vertices[corners[1]] - a, mesh_.vertices[corners[2]] - a);
   hit.facet = normalized(area);

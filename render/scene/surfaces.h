@@ -21,6 +21,9 @@ struct SurfacePlace {
 /// Threads: everything but add() and build() may be called from several threads.
 class Surfaces {
  public:
+  /// Cosine between facet and a vertex's normal below which the surface has a crease there: 45 degrees.
+  static constexpr double kCrease = 0.707;
+
   Surfaces() = default;
   Surfaces(const Surfaces&) = delete;  // the tree points at the mesh
   Surfaces& operator=(const Surfaces&) = delete;
@@ -34,7 +37,7 @@ class Surfaces {
 
   struct Hit {
     int object = 0;
-    std::size_t triangle = 0;
+    std::size_t triangle = 0;       ///< of the object's mesh
     std::array<int, 3> vertices{};  ///< of the object's mesh
     std::array<double, 3> weights{};
     Vec3 place{};
@@ -72,6 +75,7 @@ class Surfaces {
   std::vector<Vec3> normals_;
   std::vector<std::uint16_t> objects_;  // of each triangle
   std::vector<int> first_vertices_;     // of each object
+  std::vector<std::size_t> first_triangles_;
   std::optional<TriangleTree> tree_;
 };
 

@@ -57,6 +57,7 @@ Result<std::unique_ptr<ViewModel>> ViewModel::create(const Scene& scene,
   auto renderer = SceneRenderer::create(scene, team, step, stop);
   if (!renderer) return renderer.error();
   model->renderer_ = *std::move(renderer);
+  model->renderer_->leave_out_single_scattering();
   model->lights_ = scene.lights;
   if (auto made = model->make_raster(); !made) return made.error();
   return model;

@@ -60,14 +60,15 @@ TEST(BeamDeposit, ScattersWhatBeersLawTakesWhereItTakesIt) {
     const Vec3 along = normalized(face.middle.normal * -1.0 + Vec3{0.2, 0.1, -0.1});
     double sum = 0.0;
     Vec3 moment;
-    deposit.follow(
-        {static_cast<int>(f), along, {2.0, 0.0, 0.0}}, [&](const BeamDeposit::Deposit& d) {
-          sum += d.power[0];
-          EXPECT_EQ(d.power[1], 0.0);
-          for (int k = 0; k < 4; ++k) {
-            moment = moment + mesh.vertices[mesh.tets[d.tet][k]] * (d.power[0] * d.corners[0][k]);
-          }
-        });
+    deposit.follow(deposit.behind({static_cast<int>(f), along, {2.0, 0.0, 0.0}}),
+                   [&](const BeamDeposit::Deposit& d) {
+                     sum += d.power[0];
+                     EXPECT_EQ(d.power[1], 0.0);
+                     for (int k = 0; k < 4; ++k) {
+                       moment = moment +
+                                mesh.vertices[mesh.tets[d.tet][k]] * (d.power[0] * d.corners[0][k]);
+                     }
+                   });
     const double extinction = kScattering + kAbsorption;
     const double tau = extinction * chord(deposit, face.middle.place, along);
     EXPECT_NEAR(
@@ -132,7 +133,7 @@ TEST(BeamDeposit, LightScattersFirstWhereMonteCarloHasItsFirstCollisions) {
   std::array<double, 10> ours{};
   std::array<double, 10> traced{};
   for (const Beam& beam : ball.beams) {
-    deposit.follow(beam, [&](const BeamDeposit::Deposit& d) {
+    deposit.follow(deposit.behind(beam), [&](const BeamDeposit::Deposit& d) {
       ours.at(layer_of(d.tet)) += d.power[0] / ball.entered;
     });
   }
