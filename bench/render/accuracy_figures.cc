@@ -143,6 +143,10 @@ void measure_transport() {
   for (const std::string name : {"torus", "figurine"}) {
     print_transport_error(name + "-collimated",
                           transport_error(name, true, elements_of(name, 0), kPhotons, team));
+    auto sharp = elements_of(name, 0);
+    sharp.single_scattering = true;
+    print_transport_error(name + "-collimated-sharp",
+                          transport_error(name, true, sharp, kPhotons, team));
     for (const auto& [directions, label] : kDirections) {
       const std::string which = fmt::format("{}-diffuse{}", name, label);
       auto options = elements_of(name, directions);
