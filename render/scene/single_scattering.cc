@@ -11,8 +11,8 @@ namespace {
 using reconstruct::diffusion::fresnel_reflectance;
 using reconstruct::diffusion::refracted_cosine;
 
-constexpr double kTogether = 0.05;  // of what a ray scatters, looked at in one place
-constexpr double kDeepest = 0.2;    // optical depth between two places
+constexpr double kTogether = 0.015;  // of what a ray scatters, looked at in one place
+constexpr double kDeepest = 0.2;     // optical depth between two places
 constexpr int kMostTurns = 5;
 constexpr double kSame = 1.0 - 1e-6;  // cosine between directions
 

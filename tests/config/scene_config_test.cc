@@ -57,7 +57,8 @@ TEST(SceneConfig, ShowsItsKeysInTheExampleAndReadsThem) {
 }
 
 TEST(SceneConfig, AcceptsTheScenesThatComeWithTheProgram) {
-  for (const char* name : {"scene_marble_torus.toml", "scene_wax_figurine.toml"}) {
+  for (const char* name :
+       {"scene_marble_torus.toml", "scene_wax_figurine.toml", "scene_beam_in_ball.toml"}) {
     const auto scene = load_scene(config_file(name));
     EXPECT_TRUE(scene) << scene.error().message;
   }
