@@ -7,7 +7,7 @@
 
 namespace opaline {
 
-/// Of the natural logarithms of one channel's coefficients, one value a cell in the block's order.
+/// What is said of the natural logarithms of one channel's coefficients, one value a cell in the block's order.
 struct LogCoefficients {
   std::vector<double> absorption;          ///< of log sigma_a
   std::vector<double> reduced_scattering;  ///< of log sigma_s'
@@ -16,10 +16,9 @@ struct LogCoefficients {
 };
 
 /// How well one channel is known: the posterior's mean lies `shift` from what is reported, and its own
-/// deviation is (deviation^2 - shift^2)^(1/2).
+/// deviation is (deviation^2 - shift^2)^(1/2). Of the logarithms: 0.1 is about 10 %, 1 a factor of e.
 struct ChannelUncertainty {
-  LogCoefficients
-      deviation;  ///< about what is reported; 0.1 is about 10 %, 1 a factor of e up or down
+  LogCoefficients deviation;  ///< about what is reported
   LogCoefficients shift;
   bool operator==(const ChannelUncertainty&) const = default;
 };

@@ -178,16 +178,16 @@ void compare_with_eigen(const ForwardCase& problem, const Timed& ours, int round
   print_figure("forward.ratio_vs_eigen_cg", problem.name, eigen.seconds / ours.seconds, "x");
 }
 
-void print_relaxation(const std::string& name,
+void print_relaxation(const ForwardCase& problem,
                       const char* how,
                       const RelaxationRun& relaxed,
                       double ours) {
   const std::string figure = fmt::format("forward.relaxation{}_", how);
-  print_figure(figure + "front_face_error", name, relaxed.error, "1");
-  print_figure(figure + "sweeps", name, relaxed.sweeps, "1");
-  print_figure(figure + "seconds", name, relaxed.seconds, "s");
+  print_figure(figure + "front_face_error", problem.name, relaxed.error, "1");
+  print_figure(figure + "sweeps", problem.name, relaxed.sweeps, "1");
+  print_figure(figure + "seconds", problem.name, relaxed.seconds, "s");
   print_figure(
-      fmt::format("forward.ratio_vs_relaxation{}", how), name, relaxed.seconds / ours, "x");
+      fmt::format("forward.ratio_vs_relaxation{}", how), problem.name, relaxed.seconds / ours, "x");
 }
 
 /// Relaxation to the front-face error of our answer. As published it takes one illumination after the other, and is
@@ -197,12 +197,9 @@ Result<void> compare_with_relaxation(const ForwardCase& problem, const Timed& ou
   if (!exact) return exact.error();
   const double error = front_face_error(problem, ours.x, exact->x);
   print_figure("forward.front_face_error", problem.name, error, "1");
-  print_relaxation(problem.name,
-                   "",
-                   run_published_relaxation(problem, exact->x, error, kPublished),
-                   ours.seconds);
   print_relaxation(
-      problem.name, "_batched", run_relaxation(problem, exact->x, error), ours.seconds);
+      problem, "", run_published_relaxation(problem, exact->x, error, kPublished), ours.seconds);
+  print_relaxation(problem, "_batched", run_relaxation(problem, exact->x, error), ours.seconds);
   return ok();
 }
 

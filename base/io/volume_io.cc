@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -265,8 +266,6 @@ Result<Material> to_material(const Contents& contents) {
   return material;
 }
 
-constexpr float kMostShift = 1e6f;
-
 /// All of its grids or none.
 Result<std::optional<MaterialUncertainty>> to_uncertainty(const Contents& contents) {
   const auto is_there = [&](const UncertaintyGrid& wanted) {
@@ -281,7 +280,8 @@ Result<std::optional<MaterialUncertainty>> to_uncertainty(const Contents& conten
   MaterialUncertainty channels;
   for (const UncertaintyGrid& grid : kUncertaintyGrids) {
     const auto of = [&](ChannelUncertainty& c) -> std::vector<double>& { return grid.of(c); };
-    const float least = grid.kind == &ChannelUncertainty::shift ? -kMostShift : 0.0f;
+    const float least =
+        grid.kind == &ChannelUncertainty::shift ? std::numeric_limits<float>::lowest() : 0.0f;
     auto r = read_field(contents, grid.name, *block, least, of, channels);
     if (!r) return r.error();
   }

@@ -10,9 +10,9 @@ namespace {
 using reconstruct::diffusion::FieldBatch;
 using reconstruct::diffusion::Medium;
 
-constexpr int kLanes = 16;  // right-hand sides side by side, where they are batched
-constexpr int kLook = 20;   // sweeps between two looks at the error
-constexpr int kLooksARound = 20;
+constexpr int kLanes = 16;        // right-hand sides side by side, where they are batched
+constexpr int kLook = 20;         // sweeps between two looks at the error
+constexpr int kLooksARound = 20;  // before what is left is put on the right-hand side
 constexpr int kCoarseSweeps = 400;
 constexpr int kMostSweeps = 200000;
 

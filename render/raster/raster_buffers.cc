@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/scene/surfaces.h"
+
 namespace opaline::render {
 namespace {
 
@@ -13,7 +15,6 @@ constexpr double kMargin = 1.01;   // around the scene in a shadow map
 constexpr double kWidest = 80.0;   // degrees from a shadow map's middle to its side
 constexpr double kNearest = 1e-3;  // of the scene's radius, in front of a light
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr double kCrease = 0.707;  // cosine between facet and vertex normal, as in surfaces.cc
 
 Vec4f vec4(Vec3 v, double w) {
   return {static_cast<float>(v.x),
@@ -111,8 +112,8 @@ class RasterMesh {
     for (const auto& t : mesh_.triangles) {
       const Vec3 a = mesh_.vertices[t[0]];
       const Vec3 facet = normalized(cross(mesh_.vertices[t[1]] - a, mesh_.vertices[t[2]] - a));
-      const bool creased =
-          std::ranges::any_of(t, [&](int v) { return !(dot(normals_[v], facet) > kCrease); });
+      const bool creased = std::ranges::any_of(
+          t, [&](int v) { return !(dot(normals_[v], facet) > Surfaces::kCrease); });
       for (const int v : t) {
         geometry_.corners.push_back(creased ? add_vertex(v, facet)
                                             : first + static_cast<std::uint32_t>(v));
