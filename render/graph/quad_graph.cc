@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <numeric>
+#include <utility>
 
 namespace opaline::render {
 namespace {
@@ -22,27 +21,33 @@ FaceShape shape_of(const TetMesh& mesh, const std::array<int, 3>& face) {
   return {(a + b + c) * (1.0 / 3.0), normalized(n), 0.5 * length(n)};
 }
 
-std::uint64_t spread(std::uint32_t x) {
-  std::uint64_t spread = 0;
-  for (int b = 0; b < 20; ++b) spread |= static_cast<std::uint64_t>(x >> b & 1U) << (3 * b);
-  return spread;
-}
-
-/// Positions sorted along the curve: order[new] = old.
-std::vector<int> curve_order(const std::vector<Vec3>& places) {
-  const Box box = bounds({places, {}});
-  const Vec3 size = box.size();
-  const double scale = 1048575.0 / std::max({size.x, size.y, size.z, 1e-300});
-  std::vector<std::uint64_t> codes(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const Vec3 p = (places[i] - box.low) * scale;
-    codes[i] = spread(static_cast<std::uint32_t>(p.x)) |
-               spread(static_cast<std::uint32_t>(p.y)) << 1 |
-               spread(static_cast<std::uint32_t>(p.z)) << 2;
+/// Tetrahedra layer by layer, each layer the neighbours of the one before; every part of the mesh begins at its end along the
+/// box's longest edge. order[new] = old.
+std::vector<int> layer_order(const TetMesh& mesh) {
+  const Vec3 size = bounds({mesh.vertices, {}}).size();
+  const double longest = std::max({size.x, size.y, size.z});
+  const Vec3 along{size.x == longest ? 1.0 : 0.0,
+                   size.x < longest && size.y == longest ? 1.0 : 0.0,
+                   std::max(size.x, size.y) < longest ? 1.0 : 0.0};
+  std::vector<std::pair<double, int>> starts;
+  for (std::size_t t = 0; t < mesh.tets.size(); ++t)
+    starts.emplace_back(dot(centroid_of(mesh, t), along), static_cast<int>(t));
+  std::ranges::sort(starts);
+  const auto neighbours = neighbours_of(mesh);
+  std::vector<char> seen(mesh.tets.size(), 0);
+  std::vector<int> order;
+  order.reserve(mesh.tets.size());
+  const auto take = [&](int t) {
+    if (t < 0 || seen[t] != 0) return;
+    seen[t] = 1;
+    order.push_back(t);
+  };
+  std::size_t next = 0;
+  for (const auto& [place, start] : starts) {
+    take(start);
+    for (; next < order.size(); ++next)
+      for (const int neighbour : neighbours[order[next]]) take(neighbour);
   }
-  std::vector<int> order(places.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::sort(order, {}, [&](int i) { return std::pair(codes[i], i); });
   return order;
 }
 
@@ -89,13 +94,10 @@ void update_geometry(const TetMesh& mesh, QuadGraph& graph) {
 }
 
 TetMesh pack(const TetMesh& mesh) {
-  std::vector<Vec3> centroids;
-  centroids.reserve(mesh.tets.size());
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t) centroids.push_back(centroid_of(mesh, t));
   TetMesh packed;
   std::vector<int> number(mesh.vertices.size(), -1);
   packed.tets.reserve(mesh.tets.size());
-  for (const int t : curve_order(centroids)) {
+  for (const int t : layer_order(mesh)) {
     auto tet = mesh.tets[t];
     for (int& v : tet) {
       if (number[v] < 0) {

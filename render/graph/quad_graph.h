@@ -46,9 +46,9 @@ QuadGraph make_quad_graph(const TetMesh& mesh);
 /// tetrahedra are those the graph was made from: the links stay.
 void update_geometry(const TetMesh& mesh, QuadGraph& graph);
 
-/// The same mesh with tetrahedra and vertices in the order of a space-filling
-/// curve (Morton), so that what is near in space is near in memory: the paper's
-/// packing (sec. 5.1), for caches instead of textures.
+/// The same mesh with its tetrahedra layer by layer from one end to the other, each layer the neighbours of the one before
+/// (Cuthill & McKee 1969), so that neighbours are at most two layers apart in memory: the paper's packing (sec. 5.1), for caches
+/// instead of textures, and for sweeps (render/solver/sweep_matrix.h) that go from row to row. Vertices follow.
 TetMesh pack(const TetMesh& mesh);
 
 }  // namespace opaline::render

@@ -157,7 +157,7 @@ template <class T>
 Interpolation<T> smooth_interpolation(const LaneMatrix<T>& a,
                                       const Groups& groups,
                                       double strength) {
-  constexpr T kDamping = T{2} / 3;
+  constexpr T kDamping = T{4} / 5;
   const std::vector<char> strong = strong_entries(a, strength);
   Interpolation<T> p;
   p.coarse_rows = groups.count;

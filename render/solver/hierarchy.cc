@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <memory>
 #include <utility>
 
 #include "render/solver/large_pages.h"
-#include "render/solver/past_caches.h"
 
 namespace opaline::render {
 namespace {
 
 constexpr int kParallelRows = 4000;  // fewer are not worth waking anybody
-constexpr double kSmoothedShare = 0.25;
 
 template <class Work>
 void over_rows(int rows, ThreadTeam& team, const Work& work) {
@@ -20,127 +18,27 @@ void over_rows(int rows, ThreadTeam& team, const Work& work) {
     work(RowRange{0, rows});
     return;
   }
-  team.run([&](int thread) {
-    work(share_of(rows, thread, team.size()));
-    finish_writing();
-  });
-}
-
-template <class T>
-std::vector<Lanes<T>> inverse_diagonal(const LaneMatrix<T>& a) {
-  auto inverse = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
-  for (int i = 0; i < a.rows(); ++i) inverse[i] = divide(Lanes<T>::all(1), a.diagonal(i));
-  return inverse;
-}
-
-/// The largest eigenvalue of D^-1 A of any channel, a little above: power
-/// iterations.
-template <class T>
-double largest_eigenvalue(const LaneMatrix<T>& a, const std::vector<Lanes<T>>& inverse) {
-  std::vector<Lanes<T>> x(a.rows());
-  std::vector<Lanes<T>> y(a.rows());
-  for (int i = 0; i < a.rows(); ++i)
-    x[i] = Lanes<T>::all(
-        static_cast<T>(static_cast<double>(std::int64_t{i} * 7919 % 101) / 50.0 - 1.0));
-  double largest = 0.0;
-  for (int iteration = 0; iteration < 12; ++iteration) {
-    Lanes<T> size = Lanes<T>::zero();
-    Lanes<T> before = Lanes<T>::zero();
-    for (int i = 0; i < a.rows(); ++i) {
-      y[i] = inverse[i] * apply_row(a, x.data(), i);
-      size += y[i] * y[i];
-      before += x[i] * x[i];
-    }
-    const Lanes<T> ratio = divide(size, before);
-    largest =
-        std::sqrt(std::max({static_cast<double>(ratio[0]), double(ratio[1]), double(ratio[2])}));
-    Lanes<T> scale{};
-    for (int lane = 0; lane < kLanes; ++lane)
-      scale.set(lane, size[lane] > 0 ? 1 / std::sqrt(size[lane]) : T{0});
-    for (int i = 0; i < a.rows(); ++i) x[i] = y[i] * scale;
-  }
-  return std::clamp(1.1 * largest, 0.5, 2.0);
-}
-
-/// The factors of Chebyshev iteration over [share * largest, largest]: step k
-/// adds d = keep[k] d + take[k] D^-1 r.
-struct Chebyshev {
-  std::vector<double> keep;
-  std::vector<double> take;
-};
-
-Chebyshev chebyshev(int steps, double largest) {
-  const double theta = 0.5 * largest * (1.0 + kSmoothedShare);
-  const double delta = 0.5 * largest * (1.0 - kSmoothedShare);
-  Chebyshev factors{{0.0}, {1.0 / theta}};
-  double rho = delta / theta;
-  for (int k = 1; k < steps; ++k) {
-    const double next = 1.0 / (2.0 * theta / delta - rho);
-    factors.keep.push_back(next * rho);
-    factors.take.push_back(2.0 * next / delta);
-    rho = next;
-  }
-  return factors;
+  team.run([&](int thread) { work(share_of(rows, thread, team.size())); });
 }
 
 }  // namespace
 
 template <class T>
 struct Hierarchy<T>::Level {
-  LaneMatrix<T> matrix;  // empty at the finest, which belongs to the caller
-  std::vector<Lanes<T>> inverse;
-  Chebyshev factors;
-  Interpolation<T> prolongation;  // from the next level; empty at the coarsest
+  std::unique_ptr<SweepMatrix<T>> matrix;  // none at the finest, which belongs to the caller
+  Interpolation<T> prolongation;           // from the next level; empty at the coarsest
   Interpolation<T> restriction;
-  std::vector<Lanes<T>> b;
-  std::vector<Lanes<T>> x;
-  std::vector<Lanes<T>> next;
-  std::vector<Lanes<T>> d;  // empty where there is one step
-  std::size_t finest_entries = 0;
+  Field b;  // empty at the finest, like x
+  Field x;
+  Field rest;
+  Field heard;  // zero between two cycles
 
-  Level(const LaneMatrix<T>& a, int steps)
-      : inverse(inverse_diagonal(a)), factors(chebyshev(steps, largest_eigenvalue(a, inverse))) {
-    for (auto* field : {&b, &x, &next}) *field = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
-    if (steps > 1) d = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
-    finest_entries = a.columns.size() + a.sinks.size();
+  explicit Level(int rows) {
+    for (Field* field : {&rest, &heard}) *field = large_vector<Lanes<T>>(rows, Lanes<T>::zero());
   }
-
-  /// x from zero.
-  void first_step(const std::vector<Lanes<T>>& right, ThreadTeam& team) {
-    const auto take = static_cast<T>(factors.take[0]);
-    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
-      const FieldWriter<T> first(x.data(), x.size());
-      for (int i = range.first; i < range.last; ++i) first.put(i, inverse[i] * right[i] * take);
-      if (d.empty()) return;
-      for (int i = range.first; i < range.last; ++i) d[i] = x[i];
-    });
-  }
-
-  /// `row(x, i)` is row i of A x; `out` gets the step's result.
-  template <class Row>
-  void step(const std::vector<Lanes<T>>& right,
-            const Row& row,
-            std::size_t k,
-            std::vector<Lanes<T>>& out,
-            ThreadTeam& team) {
-    const auto keep = static_cast<T>(factors.keep[k]);
-    const auto take = static_cast<T>(factors.take[k]);
-    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
-      const FieldWriter<T> after(out.data(), out.size());
-      for (int i = range.first; i < range.last; ++i) {
-        Lanes<T> move = inverse[i] * (right[i] - row(x.data(), i)) * take;
-        if (!d.empty()) move = d[i] = k > 0 ? d[i] * keep + move : move;
-        after.put(i, x[i] + move);
-      }
-    });
-  }
-
-  template <class Row>
-  void residual(const std::vector<Lanes<T>>& right, const Row& row, ThreadTeam& team) {
-    over_rows(static_cast<int>(x.size()), team, [&](RowRange range) {
-      const FieldWriter<T> left(next.data(), next.size());
-      for (int i = range.first; i < range.last; ++i) left.put(i, right[i] - row(x.data(), i));
-    });
+  void make_coarse(const LaneMatrix<T>& a, int blocks) {
+    matrix = std::make_unique<SweepMatrix<T>>(a, blocks, false);
+    for (Field* field : {&b, &x}) *field = large_vector<Lanes<T>>(a.rows(), Lanes<T>::zero());
   }
 
   void restrict_to(Level& coarse, ThreadTeam& team) const {
@@ -148,21 +46,21 @@ struct Hierarchy<T>::Level {
       for (int c = range.first; c < range.last; ++c) {
         Lanes<T> sum = Lanes<T>::zero();
         for (int e = restriction.starts[c]; e < restriction.starts[c + 1]; ++e) {
-          sum += next[restriction.columns[e]] * restriction.weights[e];
+          sum += rest[restriction.columns[e]] * restriction.weights[e];
         }
         coarse.b[c] = sum;
       }
     });
   }
 
-  void add_from(const Level& coarse, ThreadTeam& team) {
+  void add_from(const Level& coarse, Field& field, ThreadTeam& team) const {
     over_rows(prolongation.rows(), team, [&](RowRange range) {
       for (int i = range.first; i < range.last; ++i) {
         Lanes<T> sum = Lanes<T>::zero();
         for (int e = prolongation.starts[i]; e < prolongation.starts[i + 1]; ++e) {
           sum += coarse.x[prolongation.columns[e]] * prolongation.weights[e];
         }
-        x[i] += sum;
+        field[i] += sum;
       }
     });
   }
@@ -238,25 +136,26 @@ struct Hierarchy<T>::Coarsest {
 };
 
 template <class T>
-Hierarchy<T>::Hierarchy(const LaneMatrix<T>& finest, const HierarchyOptions& options)
-    : options_(options), rough_(rough_entries(finest)) {
+Hierarchy<T>::Hierarchy(const LaneMatrix<T>& finest, const HierarchyOptions& options, int threads) {
+  LaneMatrix<T> here;
   const LaneMatrix<T>* a = &finest;
   double strength = options.strength;
-  const auto most = static_cast<std::size_t>(options.most_levels);
-  levels_.reserve(most);  // the next level's matrix is read from the one before
-  levels_.emplace_back(*a, options.smoothing_steps);
-  while (a->rows() > options.coarsest_rows && levels_.size() < most) {
+  levels_.emplace_back(a->rows());
+  while (a->rows() > options.coarsest_rows &&
+         static_cast<int>(levels_.size()) < options.most_levels) {
     const Groups groups = aggregate(*a, strength, levels_.size() == 1 ? options.first_rings : 1);
     if (groups.count * 10 > a->rows() * 9) break;  // nothing couples any more
     Level& fine = levels_.back();
     fine.prolongation = smooth_interpolation(*a, groups, strength);
     fine.restriction = transpose(fine.prolongation);
-    LaneMatrix<T> coarse = coarsen(*a, fine.prolongation, fine.restriction);
-    levels_.emplace_back(coarse, options.smoothing_steps);
-    levels_.back().matrix = std::move(coarse);
-    a = &levels_.back().matrix;
+    here = coarsen(*a, fine.prolongation, fine.restriction);
+    a = &here;
+    levels_.emplace_back(here.rows());
+    levels_.back().make_coarse(here, threads);
+    entries_ += static_cast<double>(here.columns.size() + here.sinks.size());
     strength *= 0.5;
   }
+  entries_ /= static_cast<double>(finest.columns.size() + finest.sinks.size());
   if (a->rows() <= 4 * options.coarsest_rows) coarsest_ = std::make_unique<Coarsest>(*a);
 }
 
@@ -267,32 +166,20 @@ Hierarchy<T>::Hierarchy(Hierarchy&&) noexcept = default;
 template <class T>
 Hierarchy<T>& Hierarchy<T>::operator=(Hierarchy&&) noexcept = default;
 
-/// From the level's own right-hand side into `out`.
 template <class T>
-template <class Row>
-void Hierarchy<T>::cycle(std::size_t level,
-                         const std::vector<Lanes<T>>& right,
-                         const Row& row,
-                         std::vector<Lanes<T>>& out,
-                         ThreadTeam& team) {
+Lanes<T> Hierarchy<T>::cycle(
+    std::size_t level, const SweepMatrix<T>& a, const Field& r, Field& x, ThreadTeam& team) {
   Level& here = levels_[level];
-  const std::size_t steps = here.factors.take.size();
-  here.first_step(right, team);
-  for (std::size_t k = 1; k < steps; ++k) {
-    here.step(right, row, k, here.next, team);
-    std::swap(here.x, here.next);
-  }
+  a.over_blocks(team, [&](int block) { a.sweep_up(block, r, x, here.rest); });
   if (level + 1 < levels_.size()) {
-    here.residual(right, row, team);
+    if (a.has_seams())
+      a.over_blocks(team, [&](int block) { a.add_seams_to_rest(block, x, here.rest); });
     here.restrict_to(levels_[level + 1], team);
     descend(level + 1, team);
-    here.add_from(levels_[level + 1], team);
+    here.add_from(levels_[level + 1], x, team);
   }
-  for (std::size_t k = 0; k + 1 < steps; ++k) {
-    here.step(right, row, k, here.next, team);
-    std::swap(here.x, here.next);
-  }
-  here.step(right, row, steps - 1, out, team);
+  if (a.has_seams()) a.over_blocks(team, [&](int block) { a.hear_seams(block, x, here.heard); });
+  return a.sum_over_blocks(team, [&](int block) { return a.sweep_down(block, r, here.heard, x); });
 }
 
 template <class T>
@@ -302,40 +189,24 @@ void Hierarchy<T>::descend(std::size_t level, ThreadTeam& team) {
     coarsest_->apply(here.b, here.x);
     return;
   }
-  const auto row = [&a = here.matrix](const Lanes<T>* x, int i) { return apply_row(a, x, i); };
-  cycle(level, here.b, row, here.next, team);
-  std::swap(here.x, here.next);
+  cycle(level, *here.matrix, here.b, here.x, team);
 }
 
 template <class T>
-void Hierarchy<T>::precondition(const LaneMatrix<T>& finest,
-                                const std::vector<Lanes<T>>& r,
-                                std::vector<Lanes<T>>& z,
-                                ThreadTeam& team) {
-  if (levels_.size() == 1 && coarsest_ != nullptr) {
-    coarsest_->apply(r, z);
-    return;
-  }
-  const auto row = [&](const Lanes<T>* x, int i) { return apply_rough_row(finest, rough_, x, i); };
-  cycle(0, r, row, z, team);
-}
-
-template <class T>
-void Hierarchy<T>::matrix_changed(const LaneMatrix<T>& finest) {
-  rough_ = rough_entries(finest);
+Lanes<T> Hierarchy<T>::precondition(const SweepMatrix<T>& finest,
+                                    const Field& r,
+                                    Field& z,
+                                    ThreadTeam& team) {
+  if (levels_.size() > 1 || coarsest_ == nullptr) return cycle(0, finest, r, z, team);
+  coarsest_->apply(r, z);
+  Lanes<T> product = Lanes<T>::zero();
+  for (std::size_t i = 0; i < r.size(); ++i) product += r[i] * z[i];
+  return product;
 }
 
 template <class T>
 int Hierarchy<T>::levels() const {
   return static_cast<int>(levels_.size());
-}
-
-template <class T>
-double Hierarchy<T>::complexity() const {
-  double entries = 0.0;
-  for (const Level& level : levels_)
-    entries += static_cast<double>(level.matrix.columns.size() + level.matrix.sinks.size());
-  return 1.0 + entries / static_cast<double>(levels_[0].finest_entries);
 }
 
 template class Hierarchy<float>;

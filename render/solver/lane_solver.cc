@@ -9,7 +9,6 @@
 #include "base/ensure.h"
 #include "base/flush_denormals.h"
 #include "render/solver/large_pages.h"
-#include "render/solver/past_caches.h"
 
 namespace opaline::render {
 namespace {
@@ -17,8 +16,6 @@ namespace {
 using reconstruct::diffusion::SolveOptions;
 using reconstruct::diffusion::SolveSummary;
 using reconstruct::diffusion::Termination;
-
-constexpr int kChunk = 256;  // rows summed up in T before they go into a double
 
 template <class T>
 bool is_finite(const Lanes<T>& lanes) {
@@ -62,15 +59,9 @@ Lanes<T> LaneSolver<T>::sum_over_rows(const Work& work) {
   team_.run([&](int thread) {
     const FlushDenormals flush;
     const RowRange range = share_of(rows, thread, team_.size());
-    std::array<double, kLanes> sum{};
-    for (int first = range.first; first < range.last; first += kChunk) {
-      Lanes<T> part = Lanes<T>::zero();
-      const int last = std::min(first + kChunk, range.last);
-      for (int i = first; i < last; ++i) part += work(i);
-      for (int lane = 0; lane < kLanes; ++lane) sum[lane] += static_cast<double>(part[lane]);
-    }
-    finish_writing();
-    sums[thread] = sum;
+    RowTotal<T> sum;
+    for (int i = range.first; i < range.last; ++i) sum.add(work(i));
+    sums[thread] = sum.value();
   });
   Lanes<T> total = Lanes<T>::zero();
   for (int lane = 0; lane < kLanes; ++lane) {
@@ -95,22 +86,19 @@ Lanes<T> LaneSolver<T>::dot(const std::vector<Lanes<T>>& a, const std::vector<La
 }
 
 template <class T>
-Lanes<T> LaneSolver<T>::apply_dot() {
-  const FieldWriter<T> q(q_.data(), q_.size());
-  return sum_over_rows([&](int i) {
-    const Lanes<T> product = apply_row(matrix_, p_.data(), i);
-    q.put(i, product);
-    return p_[i] * product;
-  });
-}
-
-template <class T>
-void LaneSolver<T>::turn(const Lanes<T>& alpha, const Lanes<T>& beta, std::vector<Lanes<T>>& x) {
-  sum_over_rows([&](int i) {
+Lanes<T> LaneSolver<T>::turn(const Lanes<T>& alpha,
+                             const Lanes<T>& beta,
+                             std::vector<Lanes<T>>& x) {
+  const auto next = [&](int i) {
     x[i] += alpha * p_[i];
     p_[i] = z_[i] + beta * p_[i];
-    return Lanes<T>::zero();
-  });
+  };
+  Lanes<T> energy = sweeps_.sum_over_blocks(
+      team_, [&](int block) { return sweeps_.multiply(block, next, p_, q_); });
+  if (sweeps_.has_seams())
+    energy += sweeps_.sum_over_blocks(
+        team_, [&](int block) { return sweeps_.multiply_seams(block, p_, q_); });
+  return energy;
 }
 
 template <class T>
@@ -172,18 +160,19 @@ SolveSummary LaneSolver<T>::iterate(const Lanes<T>& b2,
   Lanes<T> rz = Lanes<T>::zero();
   Lanes<T> alpha = Lanes<T>::zero();  // x still lacks alpha p
   const auto ended = [&](Termination termination, double reached) {
-    turn(alpha, Lanes<T>::zero(), x);
+    sum_over_rows([&](int i) {
+      x[i] += alpha * p_[i];
+      return Lanes<T>::zero();
+    });
     return finished(termination, iteration, reached);
   };
   for (double reached = 1e300; reached > options.tolerance; ++iteration) {
     if (stop.stop_requested()) return ended(Termination::kCancelled, reached);
     if (iteration == options.max_iterations) return ended(Termination::kIterationLimit, reached);
-    hierarchy_.precondition(matrix_, r_, z_, team_);
-    const Lanes<T> rz_now = dot(r_, z_);
+    const Lanes<T> rz_now = hierarchy_.precondition(sweeps_, r_, z_, team_);
     const Lanes<T> beta = divide(rz_now, rz);
     rz = rz_now;
-    turn(alpha, beta, x);
-    alpha = divide(rz, apply_dot());
+    alpha = divide(rz, turn(alpha, beta, x));
     reached = relative(reduce(alpha), b2);
     if (!std::isfinite(reached)) return ended(Termination::kBreakdown, reached);
   }

@@ -30,7 +30,11 @@ class LaneSolver {
              const HierarchyOptions& options,
              ThreadTeam& team,
              int remembered = 0)
-      : matrix_(matrix), team_(team), hierarchy_(matrix, options), history_(remembered) {}
+      : matrix_(matrix),
+        team_(team),
+        sweeps_(matrix, team.size(), true),
+        hierarchy_(matrix, options, team.size()),
+        history_(remembered) {}
 
   reconstruct::diffusion::SolveSummary solve(const std::vector<Lanes<T>>& b,
                                              std::vector<Lanes<T>>& x,
@@ -40,23 +44,24 @@ class LaneSolver {
   /// The hierarchy stays, and serves until the matrix has changed much. One product for every remembered solution: the next start
   /// is their best combination for the new matrix.
   void matrix_changed() {
-    hierarchy_.matrix_changed(matrix_);
+    sweeps_.take_entries(matrix_);
     history_.refresh(matrix_, team_);
   }
   /// Starts from x alone next time.
   void forget() { history_.clear(); }
-  void rebuild(const HierarchyOptions& options) { hierarchy_ = Hierarchy<T>(matrix_, options); }
+  void rebuild(const HierarchyOptions& options) {
+    hierarchy_ = Hierarchy<T>(matrix_, options, team_.size());
+  }
   const Hierarchy<T>& hierarchy() const { return hierarchy_; }
 
  private:
   Lanes<T> residual(const std::vector<Lanes<T>>& b,
                     const std::vector<Lanes<T>>& x);  // into r_; its squared norm
   Lanes<T> dot(const std::vector<Lanes<T>>& a, const std::vector<Lanes<T>>& b);
-  Lanes<T> apply_dot();  // q = A p; p . q
-  void turn(const Lanes<T>& alpha,
-            const Lanes<T>& beta,
-            std::vector<Lanes<T>>& x);     // x += alpha p, then p = z + beta p
-  Lanes<T> reduce(const Lanes<T>& alpha);  // r -= alpha q; its squared norm
+  Lanes<T> turn(const Lanes<T>& alpha,
+                const Lanes<T>& beta,
+                std::vector<Lanes<T>>& x);  // x += alpha p, p = z + beta p, q = A p; p . q
+  Lanes<T> reduce(const Lanes<T>& alpha);   // r -= alpha q; its squared norm
   reconstruct::diffusion::SolveSummary iterate(const Lanes<T>& b2,
                                                std::vector<Lanes<T>>& x,
                                                const reconstruct::diffusion::SolveOptions& options,
@@ -68,6 +73,7 @@ class LaneSolver {
 
   const LaneMatrix<T>& matrix_;
   ThreadTeam& team_;
+  SweepMatrix<T> sweeps_;
   Hierarchy<T> hierarchy_;
   SolutionHistory<T> history_;
   std::vector<Lanes<T>> r_;

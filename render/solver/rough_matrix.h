@@ -5,13 +5,12 @@
 #include <vector>
 
 #include "render/solver/lane_matrix.h"
-#include "render/solver/large_pages.h"
 
 namespace opaline::render {
 
 /// An entry of a LaneMatrix in half as many bits or fewer, for smoothing, which waits for memory and need not be exact: 16 bits
-/// of a float (sign, exponent and 7 bits, rounded to nearest), a float of a double. Row sums stay as they are, so a matrix of
-/// conductances stays one: symmetric, and positive definite.
+/// of a float (sign, exponent and 7 bits, rounded to nearest), a float of a double. A matrix by its conductances and row sums
+/// stays one: symmetric, and positive definite.
 template <class T>
 struct RoughEntry;
 
@@ -54,26 +53,5 @@ struct RoughEntry<double> {
 
 template <class T>
 using RoughEntries = std::vector<RoughEntry<T>>;
-
-template <class T>
-RoughEntries<T> rough_entries(const LaneMatrix<T>& a) {
-  RoughEntries<T> rough;
-  reserve_large(rough, a.entries.size());
-  for (const Lanes<T>& entry : a.entries) rough.push_back(RoughEntry<T>::of(entry));
-  return rough;
-}
-
-/// One row of A x, about.
-template <class T>
-inline Lanes<T> apply_rough_row(const LaneMatrix<T>& a,
-                                const RoughEntries<T>& rough,
-                                const Lanes<T>* x,
-                                int row) {
-  const Lanes<T> own = x[row];
-  Lanes<T> sum = a.sinks[row] * own;
-  for (int e = a.starts[row]; e < a.starts[row + 1]; ++e)
-    sum += rough[e].value() * (x[a.columns[e]] - own);
-  return sum;
-}
 
 }  // namespace opaline::render

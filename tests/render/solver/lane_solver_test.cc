@@ -6,63 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
+
+#include "tests/render/solver/lane_grid.h"
 
 namespace opaline::render {
 namespace {
 
 using reconstruct::diffusion::Termination;
-
-/// Conductances between neighbours of an n x n x n grid, different in every
-/// channel; all but its corner in the dark of a small sink. `contrast`: every
-/// other slab of eight layers conducts so many times better.
-template <class T>
-LaneMatrix<T> grid(int n, double contrast = 1.0, double sink = 1e-3) {
-  LaneMatrix<T> a;
-  const auto conductance = [&](int k, int c) {
-    return (1.0 + 0.5 * c) * (k / 8 % 2 == 0 ? 1.0 : contrast);
-  };
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) {
-        const int steps[6][3]{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
-        for (const auto& step : steps) {
-          const int x = i + step[0];
-          const int y = j + step[1];
-          const int z = k + step[2];
-          if (std::min({x, y, z}) < 0 || std::max({x, y, z}) >= n) continue;
-          a.columns.push_back((z * n + y) * n + x);
-          Lanes<T> entry = Lanes<T>::zero();
-          for (int c = 0; c < 3; ++c) {
-            const double own = conductance(k, c);
-            const double other = conductance(z, c);
-            entry.set(c, static_cast<T>(-2.0 * own * other / (own + other)));
-          }
-          a.entries.push_back(entry);
-        }
-        a.starts.push_back(static_cast<int>(a.columns.size()));
-        a.sinks.push_back(Lanes<T>::all(static_cast<T>(k == 0 ? 0.3 : sink)));
-      }
-    }
-  }
-  return a;
-}
-
-template <class T>
-std::vector<Lanes<T>> random_field(int rows, unsigned seed) {
-  std::mt19937 generator(seed);
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  std::vector<Lanes<T>> field(rows, Lanes<T>::zero());
-  for (auto& value : field) {
-    for (int c = 0; c < 3; ++c) value.set(c, static_cast<T>(uniform(generator)));
-  }
-  return field;
-}
-
-template <class T>
-std::vector<Lanes<T>> dark(int rows) {
-  return std::vector<Lanes<T>>(rows, Lanes<T>::zero());
-}
 
 Eigen::MatrixXd dense(const LaneMatrix<double>& a, int channel) {
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(a.rows(), a.rows());
@@ -94,7 +44,7 @@ TEST(LaneSolver, AgreesWithADirectSolverInEveryChannel) {
 TEST(LaneSolver, IterationsHardlyGrowWithTheNumberOfNodes) {
   ThreadTeam team(2);
   int small = 0;
-  for (const int n : {16, 32, 48, 82}) {  // the last is written past the caches (past_caches.h)
+  for (const int n : {16, 32, 48, 82}) {
     const auto a = grid<float>(n, 1.0, 1e-2);
     LaneSolver<float> solver(a, {}, team);
     auto x = dark<float>(a.rows());
@@ -152,21 +102,26 @@ TEST(LaneSolver, WhatSinglePrecisionCannotReachIsSaid) {
 
 TEST(LaneSolver, OneCycleIsASymmetricOperator) {
   ThreadTeam team(2);
-  const auto a = grid<double>(14, 10.0);
-  Hierarchy<double> hierarchy(a, {});
+  const auto a = grid<double>(17, 10.0);
+  const SweepMatrix<double> finest(a, team.size(), false);
+  ASSERT_EQ(finest.blocks(), 2);
+  Hierarchy<double> hierarchy(a, {}, team.size());
   const auto u = random_field<double>(a.rows(), 4);
   const auto v = random_field<double>(a.rows(), 5);
   auto bu = dark<double>(a.rows());
   auto bv = dark<double>(a.rows());
-  hierarchy.precondition(a, u, bu, team);
-  hierarchy.precondition(a, v, bv, team);
+  const Lanes<double> own = hierarchy.precondition(finest, u, bu, team);
+  hierarchy.precondition(finest, v, bv, team);
   for (int c = 0; c < 3; ++c) {
     double ubv = 0.0;
     double vbu = 0.0;
+    double ubu = 0.0;
     for (int i = 0; i < a.rows(); ++i) {
       ubv += u[i][c] * bv[i][c];
       vbu += v[i][c] * bu[i][c];
+      ubu += u[i][c] * bu[i][c];
     }
+    EXPECT_NEAR(own[c] / ubu, 1.0, 1e-12);
     EXPECT_NEAR(ubv / vbu, 1.0, 1e-10);
   }
 }
