@@ -278,6 +278,32 @@ TEST(SceneRenderer, TwiceTheLightIsTwiceThePictureAndThreadsDoNotMatter) {
   EXPECT_LT(difference, 1e-3 * size);  // the solution's tolerance is 1e-4
 }
 
+TEST(SceneRenderer, LeavesSingleScatteringToDiffusionForThoseWhoCannotFollowRays) {
+  Scene scene = scene_of({sphere()});
+  scene.picture = {.width = 24, .height = 24, .samples_per_axis = 1};
+  scene.diffusion.tetrahedra = 3e3;
+  scene.lights = {sun({-1.0, 0.5, -0.5})};
+  const auto diffused = drawn(scene);
+  scene.diffusion.single_scattering = true;
+  const auto as_itself = drawn(scene);
+  ThreadTeam team(2);
+  auto renderer = SceneRenderer::create(scene, team, [](std::string_view, double) {}, {});
+  ASSERT_TRUE(diffused && as_itself && renderer);
+  (*renderer)->leave_out_single_scattering();
+  ASSERT_TRUE((*renderer)->light(scene.lights, {}));
+  const auto left = (*renderer)->draw(camera_of(scene.camera, scene.picture), {});
+  ASSERT_TRUE(left);
+  EXPECT_THAT((*renderer)->statistics().left_out, Contains(HasSubstr("single scattering")));
+  double difference = 0.0;
+  double size = 0.0;
+  for (std::size_t i = 0; i < left->samples().size(); ++i) {
+    EXPECT_FLOAT_EQ(left->samples()[i], diffused->samples()[i]);
+    difference += std::abs(as_itself->samples()[i] - diffused->samples()[i]);
+    size += diffused->samples()[i];
+  }
+  EXPECT_GT(difference, 1e-3 * size);
+}
+
 TEST(SceneRenderer, SilhouettesAreAsWideAsTheSphere) {
   Scene scene = scene_of({sphere()});
   scene.picture.samples_per_axis = 4;
