@@ -22,8 +22,6 @@ SweepMatrix<T>::SweepMatrix(const LaneMatrix<T>& a, int blocks, bool keeps_exact
   const int count = std::clamp(blocks, 1, std::max(1, a.rows() / kFewestRows));
   for (int b = 0; b < count; ++b) blocks_.push_back(share_of(a.rows(), b, count));
   find_couplings(a);
-  inverse_.resize(a.rows());
-  find_lowest();
   take_entries(a);
 }
 

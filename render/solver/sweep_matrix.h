@@ -81,70 +81,6 @@ class SweepMatrix {
   void hear_seams(int block, const Field& x, Field& heard) const;
   /// x += M^-T (r - A x). `heard` is the seams' part, and zero afterwards. Answers r . x.
   Sum sweep_down(int block, const Field& r, Field& heard, Field& x) const;
-  static constexpr int kChunk = 256;
-  template <class After>
-  void sweep_up_c(const Field& r, Field& x, Field& rest, int mask, const After& after) const {
-    Lanes<T>* const values = x.data();
-    Lanes<T>* const left = rest.data();
-    const int n = rows();
-    for (int first = 0; first < n; first += kChunk) {
-      const int last = std::min(n, first + kChunk);
-      for (int k = first; k < last; ++k) {
-        Lanes<T> sum = r[k];
-        for (int e = starts_[k]; e < starts_[k + 1]; ++e)
-          sum += rough_[e].value() * values[columns_[e]];
-        const Lanes<T> own = inverse_[k] * sum;
-        for (int e = starts_[k]; e < starts_[k + 1]; ++e)
-          left[columns_[e] & mask] += rough_[e].value() * own;
-        values[k] = own;
-        left[k & mask] = Lanes<T>::zero();
-      }
-      after(last == n ? n : lowest_[last / kChunk]);
-    }
-  }
-  template <class Before>
-  Sum sweep_down_c(
-      const Field& r, Field& heard, Field& x, int mask, const Before& before_chunk) const {
-    Lanes<T>* const values = x.data();
-    Lanes<T>* const above = heard.data();
-    RowTotal<T> product;
-    const int n = rows();
-    for (int c = (n - 1) / kChunk; c >= 0; --c) {
-      const int first = c * kChunk;
-      before_chunk(lowest_[c]);
-      for (int k = std::min(n, first + kChunk); k-- > first;) {
-        const Lanes<T> before = values[k];
-        Lanes<T> sum = r[k] + above[k & mask] - rough_sinks_[k].value() * before;
-        above[k & mask] = Lanes<T>::zero();
-        for (int e = starts_[k]; e < starts_[k + 1]; ++e)
-          sum += rough_[e].value() * (values[columns_[e]] - before);
-        const Lanes<T> own = before + inverse_[k] * sum;
-        for (int e = starts_[k]; e < starts_[k + 1]; ++e)
-          above[columns_[e] & mask] += rough_[e].value() * (own - values[columns_[e]]);
-        values[k] = own;
-        product.add(r[k] * own);
-      }
-    }
-    return product.value();
-  }
-  std::vector<int> lowest_;
-  void find_lowest() {
-    lowest_.assign((rows() + kChunk - 1) / kChunk, 0);
-    int low = rows();
-    for (int k = rows(); k-- > 0;) {
-      low = std::min(low, k);
-      for (int e = starts_[k]; e < starts_[k + 1]; ++e) low = std::min(low, columns_[e]);
-      if (k % kChunk == 0) lowest_[k / kChunk] = low;
-    }
-  }
-  int heard_mask() const {
-    int window = 1;
-    for (std::size_t c = 0; c < lowest_.size(); ++c)
-      window = std::max(window, int(c + 1) * kChunk - lowest_[c]);
-    int size = 1;
-    while (size < window) size *= 2;
-    return size - 1;
-  }
 
   /// product = A x but for the seams. next(row) makes x[row] first. Answers the share of x . A x, as a sum of squares:
   /// sum over rows of sink x^2 + sum over couplings of g (x_i - x_k)^2.
@@ -153,13 +89,12 @@ class SweepMatrix {
   /// The seams' part of both.
   Sum multiply_seams(int block, const Field& x, Field& product) const;
 
- public:
+ private:
   static constexpr int kFewestRows = 2048;  // of a block: fewer are not worth waking anybody
 
   struct Seams {
-    std::vector<int> rows;  // with any, ascending
-    std::vector<int>
-        of_blocks;  // where in `rows` each block's begin; one more than there are blocks
+    std::vector<int> rows;       // with any, ascending
+    std::vector<int> of_blocks;  // where each block's begin in `rows`; and the end
     std::vector<int> starts{0};  // of each of `rows` among columns
     std::vector<int> columns;
     std::vector<int> entries;  // where in the LaneMatrix
