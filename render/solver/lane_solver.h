@@ -19,7 +19,8 @@ namespace opaline::render {
 /// and says so.
 ///
 /// Shapes:  matrix, b and x have as many rows.
-/// Threads: one solve at a time per object.
+/// Threads: one solve at a time per object. Rows are swept in as many blocks as the team has threads
+/// (sweep_matrix.h), so teams of two sizes agree within the tolerance, not to the bit.
 template <class T>
 class LaneSolver {
  public:
