@@ -63,13 +63,7 @@ Lanes<T> LaneSolver<T>::sum_over_rows(const Work& work) {
     for (int i = range.first; i < range.last; ++i) sum.add(work(i));
     sums[thread] = sum.value();
   });
-  Lanes<T> total = Lanes<T>::zero();
-  for (int lane = 0; lane < kLanes; ++lane) {
-    double sum = 0.0;
-    for (const auto& part : sums) sum += part[lane];
-    total.set(lane, static_cast<T>(sum));
-  }
-  return total;
+  return total_of<T>(sums);
 }
 
 template <class T>

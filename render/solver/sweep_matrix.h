@@ -36,6 +36,17 @@ class RowTotal {
   std::array<double, kLanes> sum_{};
 };
 
+template <class T>
+Lanes<T> total_of(const std::vector<std::array<double, kLanes>>& parts) {
+  Lanes<T> total = Lanes<T>::zero();
+  for (int lane = 0; lane < kLanes; ++lane) {
+    double sum = 0.0;
+    for (const auto& part : parts) sum += part[lane];
+    total.set(lane, static_cast<T>(sum));
+  }
+  return total;
+}
+
 /// A symmetric LaneMatrix by its couplings g_ik = -a_ik, each once, at the higher of its two rows. One walk over the rows serves
 /// both ends: what a row hears of lower ones is gathered, what they hear of it is added to theirs. Where coupled rows are near in
 /// memory all of that stays in a cache, and half of the matrix is read, once.
@@ -133,13 +144,7 @@ template <class Work>
 Lanes<T> SweepMatrix<T>::sum_over_blocks(ThreadTeam& team, const Work& work) const {
   std::vector<Sum> sums(blocks());
   over_blocks(team, [&](int block) { sums[block] = work(block); });
-  Lanes<T> total = Lanes<T>::zero();
-  for (int lane = 0; lane < kLanes; ++lane) {
-    double sum = 0.0;
-    for (const Sum& part : sums) sum += part[lane];
-    total.set(lane, static_cast<T>(sum));
-  }
-  return total;
+  return total_of<T>(sums);
 }
 
 template <class T>
