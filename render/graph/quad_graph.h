@@ -47,7 +47,7 @@ QuadGraph make_quad_graph(const TetMesh& mesh);
 void update_geometry(const TetMesh& mesh, QuadGraph& graph);
 
 /// The same mesh with its tetrahedra layer by layer from one end to the other, each layer the neighbours of the one before
-/// (Cuthill & McKee 1969), so that neighbours are at most two layers apart in memory: the paper's packing (sec. 5.1), for caches
+/// (Cuthill & McKee 1969), so that neighbours lie in one layer or the next: the paper's packing (sec. 5.1), for caches
 /// instead of textures, and for sweeps (render/solver/sweep_matrix.h) that go from row to row. Vertices follow.
 TetMesh pack(const TetMesh& mesh);
 

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "base/ensure.h"
 #include "base/flush_denormals.h"
 #include "render/solver/large_pages.h"
+#include "render/solver/row_total.h"
 
 namespace opaline::render {
 namespace {
@@ -55,7 +55,7 @@ template <class T>
 template <class Work>
 Lanes<T> LaneSolver<T>::sum_over_rows(const Work& work) {
   const int rows = matrix_.rows();
-  std::vector<std::array<double, kLanes>> sums(team_.size());
+  std::vector<typename RowTotal<T>::Sum> sums(team_.size());
   team_.run([&](int thread) {
     const FlushDenormals flush;
     const RowRange range = share_of(rows, thread, team_.size());

@@ -1,5 +1,6 @@
 #include "render/solver/sweep_matrix.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/solver/large_pages.h"

@@ -1,51 +1,14 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <vector>
 
 #include "base/flush_denormals.h"
 #include "base/thread_team.h"
 #include "render/solver/lane_matrix.h"
 #include "render/solver/rough_matrix.h"
+#include "render/solver/row_total.h"
 
 namespace opaline::render {
-
-/// A sum over many rows: every few hundred of them in T, those in double.
-template <class T>
-class RowTotal {
- public:
-  void add(const Lanes<T>& value) {
-    part_ += value;
-    if (++count_ == kRowsAPart) close();
-  }
-  std::array<double, kLanes> value() {
-    close();
-    return sum_;
-  }
-
- private:
-  static constexpr int kRowsAPart = 256;
-  void close() {
-    for (int lane = 0; lane < kLanes; ++lane) sum_[lane] += static_cast<double>(part_[lane]);
-    part_ = Lanes<T>::zero();
-    count_ = 0;
-  }
-  Lanes<T> part_ = Lanes<T>::zero();
-  int count_ = 0;
-  std::array<double, kLanes> sum_{};
-};
-
-template <class T>
-Lanes<T> total_of(const std::vector<std::array<double, kLanes>>& parts) {
-  Lanes<T> total = Lanes<T>::zero();
-  for (int lane = 0; lane < kLanes; ++lane) {
-    double sum = 0.0;
-    for (const auto& part : parts) sum += part[lane];
-    total.set(lane, static_cast<T>(sum));
-  }
-  return total;
-}
 
 /// A symmetric LaneMatrix by its couplings g_ik = -a_ik, each once, at the higher of its two rows. One walk over the rows serves
 /// both ends: what a row hears of lower ones is gathered, what they hear of it is added to theirs. Where coupled rows are near in
@@ -64,7 +27,7 @@ template <class T>
 class SweepMatrix {
  public:
   using Field = std::vector<Lanes<T>>;
-  using Sum = std::array<double, kLanes>;
+  using Sum = typename RowTotal<T>::Sum;
 
   /// Products need the exact entries kept, smoothing does not.
   SweepMatrix(const LaneMatrix<T>& a, int blocks, bool keeps_exact);
@@ -72,7 +35,6 @@ class SweepMatrix {
   /// Other entries in the same pattern.
   void take_entries(const LaneMatrix<T>& a);
 
-  int rows() const { return static_cast<int>(inverse_.size()); }
   int blocks() const { return static_cast<int>(blocks_.size()); }
   bool has_seams() const { return blocks() > 1; }
 
